@@ -1,0 +1,1 @@
+"""The velocity-potential finite-state inflow model (VPBFSM) with ground effect."""

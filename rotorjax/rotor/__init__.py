@@ -1,0 +1,1 @@
+"""What a rotor is: geometry, airfoil tables, the catalogue and blade-element loads."""

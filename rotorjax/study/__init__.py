@@ -1,0 +1,1 @@
+"""The paper's evaluation: cases, run, figures, report."""

@@ -1,0 +1,1 @@
+"""The state-space free vortex wake."""
