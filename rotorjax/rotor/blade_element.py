@@ -1,0 +1,137 @@
+"""Section loads of a blade and what they add up to, in rotor units.
+
+Velocities are over ΩR, lengths over R, circulation over ΩR², forces per length over ρΩ²R³. u_T is the air's velocity
+over the blade from leading to trailing edge, in the disk plane; u_P is its velocity down through the disk (inflow,
+climb, flapping up).
+
+    inflow angle φ = atan2(u_P, u_T),  α = θ − φ,  θ = collective + twist
+    Γ = ½ |u| c cl (Kutta–Joukowski: L = ρ|u|Γ),  L = ½ u² c cl,  D = ½ u² c cd
+
+Sweep enters in two ways. The quarter chord's place is `geometry.sweep_offset`; whoever traces the lifting line uses it.
+The sections themselves take no notice by default: tables are entered with angle and Mach number along the flow.
+`simple_sweep=True` applies the rule of infinite swept wings (Jones, NACA TR 863): cl = cos²Λ · cl(α_n, M cos Λ) with
+tan α_n = tan α/cos Λ, and cd at the same entry, unreduced since friction follows the whole stream. Off by default
+because on the UH-60 it concerns the last 7 % of the span, where a tip is anything but an infinite wing, and neither the
+paper nor the tables' source applies it.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor import geometry
+from rotorjax.rotor.airfoil import lift_drag
+from rotorjax.rotor.geometry import Rotor
+
+
+class SectionLoads(eqx.Module):
+    """What a blade section does; every field [*n], the shape of the velocities.
+
+    cl, cd. circulation: Γ/(ΩR²). dlift, ddrag: force per length over ρΩ²R³, across and along the local flow. alpha,
+    inflow_angle: rad. mach: local.
+    """
+
+    cl: Float[Array, "*n"]
+    cd: Float[Array, "*n"]
+    circulation: Float[Array, "*n"]
+    dlift: Float[Array, "*n"]
+    ddrag: Float[Array, "*n"]
+    alpha: Float[Array, "*n"]
+    inflow_angle: Float[Array, "*n"]
+    mach: Float[Array, "*n"]
+
+
+class RotorCoefficients(NamedTuple):
+    """Thrust T/(ρA(ΩR)²) and power P/(ρA(ΩR)³), equal to the torque coefficient; power = induced + profile.
+
+    The induced part holds whatever the lift has to be dragged against: induced inflow and climb together.
+    """
+
+    thrust: Float[Array, ""]
+    power: Float[Array, ""]
+    induced: Float[Array, ""]
+    profile: Float[Array, ""]
+
+
+def section_loads(
+    rotor: Rotor,
+    operating: OperatingPoint,
+    r: Float[Array, "*#n"],
+    u_tangential: Float[Array, "*n"],
+    u_perpendicular: Float[Array, "*n"],
+    collective: Float[Array, "*#n"] | None = None,
+    *,
+    simple_sweep: bool = False,
+) -> SectionLoads:
+    """Loads of sections at r (over R) in the velocities u_T, u_P (over ΩR).
+
+    collective: pitch without twist (rad), the operating point's by default; give θ₀ + θ₁c cos ψ + θ₁s sin ψ for cyclic
+    pitch. Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite derivatives.
+    """
+    u_t, u_p, r = jnp.broadcast_arrays(u_tangential, u_perpendicular, r)
+    pitch = (operating.collective if collective is None else collective) + geometry.twist(rotor, r)
+    still = (u_t == 0) & (u_p == 0)
+    # atan2 and the square root have no derivative at the origin: move the input, not the output.
+    safe_t = jnp.where(still, 1.0, u_t)
+    phi = jnp.arctan2(u_p, safe_t)
+    speed = jnp.where(still, 0.0, jnp.sqrt(safe_t**2 + u_p**2))
+    alpha = pitch - phi
+    mach = speed * operating.tip_mach(rotor.radius)
+    cl, cd = _coefficients(rotor, r, alpha, mach, simple_sweep)
+    half_chord = 0.5 * geometry.chord(rotor, r)
+    dynamic = half_chord * (u_t**2 + u_p**2)
+    return SectionLoads(
+        cl=cl,
+        cd=cd,
+        circulation=half_chord * speed * cl,
+        dlift=dynamic * cl,
+        ddrag=dynamic * cd,
+        alpha=alpha,
+        inflow_angle=phi,
+        mach=mach,
+    )
+
+
+def disk_loading(rotor: Rotor, loads: SectionLoads) -> Float[Array, "*n"]:
+    """dC_T/dr̄ of Eq. 17, (1/π) Σ_q L_q/(ρΩ²R³), where every blade carries `loads`: the distribution over (r, ψ).
+
+    Its mean over the azimuth is Eq. 17's dC_T/dr̄, because the blades pass every azimuth in turn. Shape of the loads.
+    """
+    return rotor.blades / jnp.pi * loads.dlift
+
+
+def mean_disk_loading(rotor: Rotor, loads: SectionLoads) -> Float[Array, " R"]:
+    """Azimuth mean of `disk_loading` for loads of shape [..., R]: every axis but the last is averaged over."""
+    loading = disk_loading(rotor, loads)
+    return jnp.mean(loading.reshape(-1, loading.shape[-1]), axis=0)
+
+
+def rotor_coefficients(
+    rotor: Rotor, loads: SectionLoads, r: Float[Array, " R"], widths: Float[Array, " R"]
+) -> RotorCoefficients:
+    """C_T and C_P = C_Q from loads of shape [..., R] at r with quadrature weights `widths` (both over R).
+
+    Thrust L cos φ − D sin φ; power r(L sin φ) induced and r(D cos φ) profile, times B/π, averaged over every axis but
+    the last.
+    """
+    lift, drag, phi = loads.dlift, loads.ddrag, loads.inflow_angle
+
+    def total(per_length):
+        return rotor.blades / jnp.pi * jnp.mean(jnp.sum(per_length * widths, axis=-1))
+
+    induced = total(r * lift * jnp.sin(phi))
+    profile = total(r * drag * jnp.cos(phi))
+    thrust = total(lift * jnp.cos(phi) - drag * jnp.sin(phi))
+    return RotorCoefficients(thrust, induced + profile, induced, profile)
+
+
+def _coefficients(rotor, r, alpha, mach, simple_sweep):
+    if not simple_sweep:
+        return lift_drag(rotor.airfoil, alpha, mach)
+    cosine = jnp.cos(rotor.sweep(r))
+    normal = jnp.arctan2(jnp.sin(alpha), jnp.cos(alpha) * cosine)
+    cl, cd = lift_drag(rotor.airfoil, normal, mach * cosine)
+    return cosine**2 * cl, cd

@@ -1,0 +1,38 @@
+"""The rotors that ship with the package, and the door for everybody else's.
+
+rotor, operating = load("uh60")
+rotor, operating = load("my_rotor.toml")
+"""
+
+from importlib import resources
+from pathlib import Path
+
+from rotorjax.errors import InputError
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.rotor.rotor_file import closest, read_rotor
+
+
+def names() -> tuple[str, ...]:
+    """Names of the rotors in the catalogue, in alphabetical order."""
+    return tuple(sorted(path.stem for path in _folder().glob("*.toml")))
+
+
+def load(name_or_path: str | Path) -> tuple[Rotor, OperatingPoint]:
+    """Load a rotor, its aerofoil inside, and its nominal operating point: by name, or from one's own TOML file.
+
+    Anything that ends in .toml or is a `Path` is read as a file. Raises InputError for a name that the catalogue does
+    not have, with the closest one, and whatever `read_rotor` raises for a file.
+    """
+    if isinstance(name_or_path, Path) or (isinstance(name_or_path, str) and name_or_path.endswith(".toml")):
+        return read_rotor(name_or_path)
+    if name_or_path not in names():
+        hint = closest(str(name_or_path), names())
+        raise InputError(
+            f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is {name_or_path!r}: {hint}"
+        )
+    return read_rotor(_folder() / f"{name_or_path}.toml")
+
+
+def _folder() -> Path:
+    return Path(str(resources.files("rotorjax.rotor"))) / "data"

@@ -1,0 +1,75 @@
+"""Checks on concrete values at constructors: one line that names the argument, the rule and the value."""
+
+import math
+
+import numpy as np
+from jax.core import Tracer
+
+from rotorjax.errors import InputError
+
+
+def refuse(name: str, rule: str, value: object) -> InputError:
+    """Make the error `Argument `name` must rule, but is value.`, for the caller to raise."""
+    return InputError(f"Argument `{name}` must {rule}, but is {value!r}")
+
+
+def check_number(
+    name: str, value: object, lowest: float = -math.inf, highest: float = math.inf, *, open_: bool = False
+):
+    """Return `value` if it is a finite number in [lowest, highest] (`open_`: above lowest), else raise InputError.
+
+    A traced value has no number yet and passes, so that constructors may be differentiated through.
+    """
+    if isinstance(value, Tracer):
+        return value
+    rule = f"be {_range_in_words(lowest, highest, open_)}"
+    if isinstance(value, bool | str) or value is None or np.ndim(value) != 0:  # type: ignore[arg-type]
+        raise refuse(name, rule, value)
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise refuse(name, rule, value) from None
+    if not math.isfinite(number) or not lowest <= number <= highest or (open_ and number == lowest):
+        raise refuse(name, rule, value if isinstance(value, int | float) else number)
+    return value
+
+
+def check_stations(name: str, stations: object, values: object, first: float, last: float):
+    """Return (stations, values) as float64 numpy, or raise InputError.
+
+    Stations must increase and cover [first, last]; both must be finite, one-dimensional and of one length.
+    """
+    s, v = _numbers(f"{name}.r", stations), _numbers(f"{name}.value", values)
+    if s.shape != v.shape:
+        raise refuse(name, f"hold as many values as stations ({s.size})", f"{v.size} values")
+    bad = np.flatnonzero(np.diff(s) <= 0)
+    if bad.size:
+        i = int(bad[0])
+        raise refuse(f"{name}.r", "increase from root to tip", f"{s[i]:g} followed by {s[i + 1]:g}")
+    if s[0] > first or s[-1] < last:
+        raise refuse(f"{name}.r", f"cover {first:g} to {last:g} (r/R)", f"{s[0]:g} to {s[-1]:g}")
+    return s, v
+
+
+def _numbers(name: str, values: object) -> np.ndarray:
+    try:
+        array = np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise refuse(name, "be a list of numbers", values) from None
+    if array.ndim != 1 or array.size < 2:
+        raise refuse(name, "be a list of two or more numbers", values)
+    if not np.all(np.isfinite(array)):
+        raise refuse(
+            name,
+            "be finite throughout",
+            f"{array[~np.isfinite(array)][0]} at entry {int(np.flatnonzero(~np.isfinite(array))[0])}",
+        )
+    return array
+
+
+def _range_in_words(lowest: float, highest: float, open_: bool) -> str:
+    if math.isinf(lowest) and math.isinf(highest):
+        return "a finite number"
+    if math.isinf(highest):
+        return f"a finite number {'above' if open_ else 'of at least'} {lowest:g}"
+    return f"a number in {'(' if open_ else '['}{lowest:g}, {highest:g}]"
