@@ -1,5 +1,7 @@
 """The ground as a plane, shared by both models. No ground is `None`, never h = inf (its gradients would be NaN)."""
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -39,13 +41,14 @@ def plane(height: float, slope_deg: float = 0.0) -> Plane:
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
-    if not (jnp.isfinite(height) and height > 0):
-        raise InputError(f"height must be positive and finite (hub above ground, over R), but is {height}")
+    if not (math.isfinite(height) and height > 0):
+        raise InputError(f"Argument `height` must be positive and finite (hub above ground, over R), but is {height}")
     if not 0 <= slope_deg < 60:
-        raise InputError(f"slope must lie in [0, 60) degrees, but is {slope_deg}")
-    clearance = float(jnp.tan(jnp.deg2rad(slope_deg)))
+        raise InputError(f"Argument `slope_deg` must lie in [0, 60) degrees, but is {slope_deg}")
+    clearance = math.tan(math.radians(slope_deg))
     if height <= clearance:
         raise InputError(
-            f"height {height} over a slope of {slope_deg} deg lets the disk cut the ground: it must exceed tan(slope) = {clearance:.3f}"
+            f"Argument `height` must exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground, "
+            f"but is {height}"
         )
     return Plane(jnp.asarray(height, float), jnp.deg2rad(jnp.asarray(slope_deg, float)))

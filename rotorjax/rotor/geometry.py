@@ -115,8 +115,8 @@ def rotor(
     """Make a rotor in SI units.
 
     `chord` (m), `twist` (rad) and `sweep` (rad) are a number or a pair (stations r/R, values). Raises InputError where
-    blades is not a whole number of at least 1, the radius or a chord is not positive, root_cutout is not in [0, 1), a
-    sweep reaches ±80°, or a table has gaps, does not increase, or does not cover root_cutout to 1.
+    blades is not a whole number of at least 1, the radius or a chord is not positive, root_cutout is not in [0, 0.95],
+    a sweep reaches ±80°, or a table has gaps, does not increase, does not cover root_cutout to 1 or leaves 0 to 1.
     """
     if isinstance(blades, bool) or not isinstance(blades, int) or blades < 1:
         raise refuse("blades", "be a whole number of at least 1", blades)
@@ -171,6 +171,8 @@ def hinge(
 def _table(name: str, value: Any, first: float, last: float) -> Table:
     if isinstance(value, tuple | list) and len(value) == 2:
         stations, values = check_stations(name, *value, first=first, last=last)
+        if stations[0] < 0 or stations[-1] > 1:
+            raise refuse(f"{name}.r", "stay within 0 to 1 (r/R)", f"{stations[0]:g} to {stations[-1]:g}")
     else:
         number = float(check_number(name, value))  # type: ignore[arg-type]
         stations, values = np.array([first, last]), np.array([number, number])
