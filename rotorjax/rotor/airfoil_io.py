@@ -192,20 +192,15 @@ def _c81_rows(first: str, values: np.ndarray) -> list[str]:
 
 
 def _seven(value: float) -> str:
-    """Write a number in seven characters: the fewest decimals that are exact, else as many as fit."""
-    fits = ""
-    for decimals in range(1, 7):
+    """Write a number in seven characters with as many decimals as fit, then without the zeros at its end."""
+    for decimals in range(6, 0, -1):
         text = f"{value:.{decimals}f}"
-        if len(text) > 7:
-            text = text.replace("0.", ".", 1) if abs(value) < 1 else text
-        if len(text) > 7:
-            break
-        fits = text
-        if float(text) == value:
-            break
-    if not fits:
-        raise InputError(f"A C81 value must fit in seven characters, but is {value}")
-    return f"{fits:>7}"
+        short = text.replace("0.", ".", 1) if abs(value) < 1 else text
+        if len(short) <= 7:
+            kept = text.rstrip("0")
+            kept += "0" if kept.endswith(".") else ""
+            return "    0.0" if float(kept) == 0 else f"{kept if len(kept) <= 7 else short.rstrip('0'):>7}"
+    raise InputError(f"A C81 value must fit in seven characters, but is {value}")
 
 
 def _read_csv(path: str | Path) -> tuple[list[str], np.ndarray]:

@@ -8,9 +8,9 @@ from jax.core import Tracer
 from rotorjax.errors import InputError
 
 
-def refuse(name: str, rule: str, value: object) -> InputError:
-    """Make the error `Argument `name` must rule, but is value.`, for the caller to raise."""
-    return InputError(f"Argument `{name}` must {rule}, but is {value!r}")
+def refuse(name: str, rule: str, shown: str) -> InputError:
+    """Make the error ``Argument `name` must rule, but is shown``, for the caller to raise."""
+    return InputError(f"Argument `{name}` must {rule}, but is {shown}")
 
 
 def check_number(
@@ -24,13 +24,13 @@ def check_number(
         return value
     rule = f"be {_range_in_words(lowest, highest, open_)}"
     if isinstance(value, bool | str) or value is None or np.ndim(value) != 0:  # type: ignore[arg-type]
-        raise refuse(name, rule, value)
+        raise refuse(name, rule, repr(value))
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise refuse(name, rule, value) from None
+        raise refuse(name, rule, repr(value)) from None
     if not math.isfinite(number) or not lowest <= number <= highest or (open_ and number == lowest):
-        raise refuse(name, rule, value if isinstance(value, int | float) else number)
+        raise refuse(name, rule, f"{number:g}")
     return value
 
 
@@ -55,9 +55,9 @@ def _numbers(name: str, values: object) -> np.ndarray:
     try:
         array = np.asarray(values, float)
     except (TypeError, ValueError):
-        raise refuse(name, "be a list of numbers", values) from None
+        raise refuse(name, "be a list of numbers", repr(values)) from None
     if array.ndim != 1 or array.size < 2:
-        raise refuse(name, "be a list of two or more numbers", values)
+        raise refuse(name, "be a list of two or more numbers", repr(values))
     if not np.all(np.isfinite(array)):
         raise refuse(
             name,

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from rotorjax.rotor.airfoil import AirfoilTable
 from rotorjax.rotor.checks import check_number, check_stations, refuse
 
-_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 class Table(eqx.Module):
@@ -80,7 +80,7 @@ def twist(rotor: Rotor, r: Float[Array, "*n"]) -> Float[Array, "*n"]:
 def sweep_offset(rotor: Rotor, r: Float[Array, "*n"]) -> Float[Array, "*n"]:
     """How far aft of the straight blade axis the quarter chord lies at r, over R: the integral of tan(sweep).
 
-    Each interval of the sweep table up to r is integrated by six Gauss points, exact to rounding where the sweep is
+    Each interval of the sweep table up to r is integrated by eight Gauss points, exact to rounding where the sweep is
     constant.
     """
     r = jnp.asarray(r, rotor.sweep.values.dtype)[..., None]
@@ -119,7 +119,7 @@ def rotor(
     a sweep reaches ±80°, or a table has gaps, does not increase, does not cover root_cutout to 1 or leaves 0 to 1.
     """
     if isinstance(blades, bool) or not isinstance(blades, int) or blades < 1:
-        raise refuse("blades", "be a whole number of at least 1", blades)
+        raise refuse("blades", "be a whole number of at least 1", repr(blades))
     check_number("radius", radius, 0.0, open_=True)
     check_number("root_cutout", root_cutout, 0.0, 0.95)
     tables = {
