@@ -8,7 +8,7 @@ from rotorjax.errors import InputError
 
 
 def require_like(found: PyTree, wanted: PyTree, name: str, *, dtype: bool = True) -> None:
-    """Raise InputError unless `found` has the tree structure, the leaf shapes and (by default) the dtypes of `wanted`."""
+    """Raise InputError unless `found` has the structure, the leaf shapes and (by default) the dtypes of `wanted`."""
     tree, target = jax.tree.structure(found), jax.tree.structure(wanted)
     if tree != target:
         raise InputError(f"Argument `{name}` must return the state's structure {target}, but returns {tree}")

@@ -58,7 +58,7 @@ def test_largest_cfl_of_upwind_transport(tableau, limit):
 
 
 def test_transport_is_bounded_below_the_limit_and_not_above():
-    """With inflow and outflow rows, by powers of R(-c A): above the limit waves grow until they leave through the end."""
+    """With inflow and outflow rows, by powers of R(-c A): above the limit waves grow until they leave."""
     ages = 144
     matrix, _ = five_point_upwind(ages)
 

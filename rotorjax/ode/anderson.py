@@ -1,0 +1,97 @@
+"""Anderson acceleration of a fixed point (Walker & Ni 2011, doi:10.1137/10078356X), safeguarded."""
+
+from collections.abc import Callable
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PyTree
+
+from rotorjax.errors import InputError
+from rotorjax.ode.outcome import Log, Measure, Outcome, flat_value, flatten, relative_rms, traceable
+
+
+class _Window:
+    """The last differences of iterates and residuals, columns of two tall matrices."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.clear()
+
+    def clear(self) -> None:
+        self.dx: list[np.ndarray] = []
+        self.df: list[np.ndarray] = []
+
+    def push(self, dx: np.ndarray, df: np.ndarray) -> None:
+        self.dx, self.df = [*self.dx, dx][-self.size :], [*self.df, df][-self.size :]
+
+    def advance(self, x: np.ndarray, f: np.ndarray, mixing: float) -> np.ndarray:
+        """Next iterate: the combination of past residuals that is least, plus `mixing` of what is left of it."""
+        if not self.dx:
+            return x + mixing * f
+        dx, df = np.stack(self.dx, axis=1), np.stack(self.df, axis=1)
+        # Old differences grow parallel to each other; lstsq drops such directions below rcond.
+        weights = np.linalg.lstsq(df, f, rcond=1e-12)[0]
+        return x + mixing * f - (dx + mixing * df) @ weights
+
+
+def anderson(
+    g: Callable[..., PyTree],
+    x0: PyTree,
+    *args: Any,
+    window: int = 8,
+    mixing: float = 0.1,
+    tol: float = 1e-10,
+    max_iterations: int = 200,
+    safeguard: float = 10.0,
+    measure: Measure = relative_rms,
+    progress: bool = False,
+) -> Outcome:
+    """Find x = g(x, *args) from x0 by Anderson acceleration.
+
+    x0: pytree of floating-point arrays. window: how many past differences are combined. mixing: share β of the
+    remaining residual that is added, in (0, 1]. measure(f, x): size of the residual f = g(x) − x, relative rms by
+    default; `tol` is compared with it. safeguard: a residual that grows to this many times the best one (or is not
+    finite) goes back to the best iterate, forgets the window and halves the mixing until there is a new best.
+
+    Numbers in `args` may change from call to call without compiling again, as long as `g` is the same function.
+    A run that diverges or is interrupted returns the best iterate with `converged` False and says why.
+
+    Raises InputError where a setting is out of range or x0 is not made of finite floating-point arrays.
+    """
+    if window < 1 or not 0 < mixing <= 1 or safeguard <= 1:
+        raise InputError(
+            f"Arguments must satisfy window ≥ 1, 0 < mixing ≤ 1, safeguard > 1, but are {window}, {mixing}, {safeguard}"
+        )
+    flat, unravel = flatten(x0)
+    args = traceable(args)
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        return np.asarray(flat_value(g, unravel, jnp.asarray(x, flat.dtype), args)) - x
+
+    past, share = _Window(window), mixing
+    x = np.asarray(flat)
+    with Log("anderson", tol, max_iterations, progress) as log:
+        f = residual(x)
+        best_f = f
+        done = log.note(x, measure(f, x))
+        while not done and len(log.residuals) <= max_iterations:
+            new = past.advance(x, f, share)
+            new_f = residual(new)
+            size, best = measure(new_f, new), log.best
+            done = log.note(new, size)
+            if not size <= safeguard * best:
+                past.clear()
+                share = share / 2
+                x, f = log.best_x, best_f
+                if share < mixing / 2**10 or not np.isfinite(best):
+                    log.why = (
+                        f"diverged: from the best residual {log.best:.2e} even a mixing of {2 * share:.1e} goes up"
+                    )
+                    break
+                continue
+            if size < best:
+                share, best_f = mixing, new_f
+            past.push(new - x, new_f - f)
+            x, f = new, new_f
+    return log.outcome(unravel)

@@ -1,0 +1,219 @@
+"""Following a solution in a parameter: natural continuation with a secant predictor, pseudo-arclength round folds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, PyTree
+from tqdm import tqdm
+
+from rotorjax.errors import InputError
+from rotorjax.ode.newton import newton
+from rotorjax.ode.outcome import Outcome, flatten
+
+Solve = Callable[[PyTree, float, Any], Outcome]
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Converged solutions along a parameter.
+
+    parameters: values in the order they were reached. outcomes: one converged Outcome each. reached: whether the last
+    parameter is the one asked for. why: one sentence. folds: numbers of the points at which the parameter turns back.
+    failed: the last outcome that did not converge, for a look at what went wrong, or None.
+    """
+
+    parameters: tuple[float, ...]
+    outcomes: tuple[Outcome, ...]
+    reached: bool
+    why: str
+    folds: tuple[int, ...] = ()
+    failed: Outcome | None = None
+
+    @property
+    def last(self) -> Outcome:
+        """The outcome at the last parameter reached."""
+        return self.outcomes[-1]
+
+
+def _secant(outcomes: list[Outcome], parameters: list[float], target: float) -> PyTree:
+    """Linear extrapolation of the last two solutions to `target`."""
+    if len(outcomes) < 2:
+        return outcomes[-1].x
+    share = (target - parameters[-1]) / (parameters[-1] - parameters[-2])
+    return jax.tree.map(lambda new, old: new + share * (new - old), outcomes[-1].x, outcomes[-2].x)
+
+
+def continuation(
+    solve: Solve,
+    x0: PyTree,
+    start: float,
+    stop: float,
+    *,
+    step: float | None = None,
+    smallest: float | None = None,
+    largest: float | None = None,
+    easy: int = 4,
+    jump: float = 0.1,
+    progress: bool = False,
+) -> Branch:
+    """Follow x(p) from p = start to stop in steps that adapt to how hard each one was.
+
+    solve(x, p, memory): finds the solution at p from the guess x; `memory` is that of the last outcome (pass it on to
+    `newton` to reuse a factorised Jacobian, or ignore it). step, smallest, largest: first, least and greatest step in
+    p, by default 1/10, 1/1000 and 1/2 of the way. A step grows by half after at most `easy` iterations and is
+    quartered where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and than
+    twice the step it was to correct. Guesses are extrapolated from the last two solutions.
+
+    Where the step falls below `smallest` the branch ends there, with `reached` False and the last failure kept: a fold
+    (see `follow`), or a solver that needs help.
+
+    Raises InputError where start equals stop or a step is not positive.
+    """
+    way = stop - start
+    step = abs(way) / 10 if step is None else step
+    smallest = abs(way) / 1000 if smallest is None else smallest
+    largest = abs(way) / 2 if largest is None else largest
+    if way == 0 or min(step, smallest, largest) <= 0:
+        raise InputError(
+            f"Arguments `start` and `stop` must differ and steps be positive, but are {start}, {stop}, {step}"
+        )
+    first = solve(x0, start, None)
+    if not first.converged:
+        return Branch((), (), False, f"no solution at the start, {start}: {first.why}", failed=first)
+    parameters, outcomes, failed = [start], [first], None
+    bar = tqdm(total=abs(way), desc="continuation", disable=not progress)
+    while parameters[-1] != stop:
+        left = stop - parameters[-1]
+        # A sliver of a last step would only cost a solve: stretch this one over it.
+        target = stop if abs(left) <= 1.2 * step else parameters[-1] + np.sign(way) * step
+        guess = _secant(outcomes, parameters, target)
+        found = solve(guess, target, outcomes[-1].memory)
+        if found.converged and len(outcomes) > 1 and _jumped(found.x, guess, outcomes[-1].x, jump):
+            found = replace(found, converged=False, why="the solver jumped to another branch")
+        if found.converged:
+            bar.update(abs(target - parameters[-1]))
+            parameters.append(target)
+            outcomes.append(found)
+            step = min(step * 1.5, largest) if found.iterations <= easy else step
+            continue
+        failed, step = found, min(step, abs(left)) / 4
+        if step < smallest:
+            bar.close()
+            why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}: step below {smallest:.2g}; {found.why}"
+            return Branch(tuple(parameters), tuple(outcomes), False, why, failed=failed)
+    bar.close()
+    return Branch(tuple(parameters), tuple(outcomes), True, f"reached {stop:.6g}", failed=failed)
+
+
+def _jumped(found: PyTree, guess: PyTree, last: PyTree, jump: float) -> bool:
+    found, guess, last = (np.asarray(ravel_pytree(x)[0]) for x in (found, guess, last))
+    gone, allowed = np.linalg.norm(found - guess), 2 * np.linalg.norm(guess - last)
+    return bool(gone > max(allowed, jump * np.linalg.norm(last)))
+
+
+class _OnPlane(eqx.Module):
+    """The residual and the plane across the branch, unknowns (x, parameter)."""
+
+    residual: Callable
+
+    def __call__(self, z: tuple, anchor: tuple, tangent: tuple, length: Array, args: tuple) -> tuple:
+        x, parameter = z
+        gone = _dot(tangent, jax.tree.map(jnp.subtract, z, anchor))
+        return self.residual(x, parameter, *args), gone - length
+
+
+def _dot(a: tuple, b: tuple) -> Array:
+    """Inner product in which all of x together counts as much as the parameter: its mean plus the parameter's."""
+    (x, p), (y, q) = (ravel_pytree(a[0])[0], a[1]), (ravel_pytree(b[0])[0], b[1])
+    return jnp.mean(x * y) + p * q
+
+
+def follow(
+    residual: Callable[..., PyTree],
+    first: tuple[PyTree, float],
+    second: tuple[PyTree, float],
+    *args: Any,
+    points: int = 50,
+    step: float | None = None,
+    smallest: float | None = None,
+    largest: float | None = None,
+    between: tuple[float, float] = (-np.inf, np.inf),
+    easy: int = 4,
+    progress: bool = False,
+    **newton_settings: Any,
+) -> Branch:
+    """Follow residual(x, p, *args) = 0 through folds by pseudo-arclength (Keller 1977) from two solutions (x, p) on it.
+
+    step, smallest, largest: first, least and greatest arc length between points, in the norm √(mean square of x + p²),
+    by default the distance of the two solutions, 1/1000 and 10 times of it. Ends after `points` points, or where p
+    leaves `between`. Further settings go to `newton`.
+
+    Raises InputError where the two solutions coincide.
+    """
+    for x, _ in (first, second):
+        flatten(x)
+    anchor, z = (_point(*first), _point(*second))
+    distance = _distance(z, anchor)
+    if distance == 0:
+        raise InputError("Arguments `first` and `second` must be two different points of the branch, but coincide")
+    step = distance if step is None else step
+    smallest = distance / 1000 if smallest is None else smallest
+    largest = 10 * distance if largest is None else largest
+    parameters, outcomes, failed = [], [], None
+    on_plane, reached, why = _OnPlane(residual), True, f"followed {points} points"
+    for _ in tqdm(range(points), desc="branch", disable=not progress):
+        length = _distance(z, anchor)
+        tangent = jax.tree.map(lambda new, old, n=length: (new - old) / n, z, anchor)
+        found = None
+        while step >= smallest:
+            guess = jax.tree.map(lambda new, t, s=step: new + s * t, z, tangent)
+            found = newton(on_plane, guess, z, tangent, step, args, **newton_settings)
+            if found.converged:
+                break
+            failed, step = found, step / 4
+        if found is None or not found.converged:
+            reached, why = (
+                False,
+                f"lost after {len(outcomes)} points at {float(z[1]):.6g}: " + (failed.why if failed else ""),
+            )
+            break
+        anchor, z = z, found.x
+        parameters.append(float(z[1]))
+        outcomes.append(found)
+        step = min(1.5 * step, largest) if found.iterations <= easy else step
+        if not between[0] <= parameters[-1] <= between[1]:
+            why = f"left {between} at {parameters[-1]:.6g}"
+            break
+    return Branch(tuple(parameters), tuple(outcomes), reached, why, _turns(first[1], second[1], parameters), failed)
+
+
+def _point(x: PyTree, parameter: float) -> tuple:
+    dtype = ravel_pytree(x)[0].dtype
+    return jax.tree.map(jnp.asarray, x), jnp.asarray(parameter, dtype)
+
+
+def _distance(a: tuple, b: tuple) -> float:
+    gap = jax.tree.map(jnp.subtract, a, b)
+    return float(jnp.sqrt(_dot(gap, gap)))
+
+
+def _turns(before: float, start: float, parameters: list[float]) -> tuple[int, ...]:
+    """Numbers of the points after which the parameter runs the other way."""
+    moves = np.diff([before, start, *parameters])
+    return tuple(int(i) - 1 for i in np.flatnonzero(moves[1:] * moves[:-1] < 0))
+
+
+def critical_direction(jacobian: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Least singular value of a Jacobian (n, n) with its right and left singular vectors (n,).
+
+    Near a fold the value goes to zero; the right vector is the way in which the solution is about to run away, the
+    left one says which equations cannot be met.
+    """
+    u, s, vt = np.linalg.svd(jacobian)
+    return float(s[-1]), vt[-1], u[:, -1]

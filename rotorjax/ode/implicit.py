@@ -1,0 +1,136 @@
+"""Derivatives of a converged solution by the implicit function theorem: one linear solve, nothing unrolled."""
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import jax.core
+import jax.numpy as jnp
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float, PyTree
+
+from rotorjax.errors import InputError
+from rotorjax.ode.jacobian import CHUNK
+from rotorjax.ode.outcome import Outcome, traceable
+
+Method = Literal["dense", "gmres"]
+
+
+def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> Float[Array, "n n"]:
+    """Matrix of a linear map, `chunk` columns at a time."""
+
+    def column(i: Array) -> Array:
+        return product((jnp.arange(example.size) == i).astype(example.dtype))
+
+    return jax.lax.map(column, jnp.arange(example.size), batch_size=min(chunk, example.size)).T
+
+
+def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int) -> Float[Array, " n"]:
+    """Solve product(v) = b so that jax can differentiate and transpose it."""
+    if method == "gmres":
+        # A long restart: short ones stagnate on wake-like spectra.
+        restart = min(b.size, 400)
+
+        # Wrapped once more: jax's gmres alone starts from zeros_like(b), which transposition takes for an unknown.
+        def solve(matrix: Callable, v: Array) -> Array:
+            gmres = jax.scipy.sparse.linalg.gmres
+            return gmres(matrix, v, tol=1e-12, restart=restart, maxiter=5, solve_method="batched")[0]
+
+        return jax.lax.custom_linear_solve(product, b, solve=solve, transpose_solve=solve)
+    factors = jax.scipy.linalg.lu_factor(_materialise(product, b, chunk))
+    return jax.lax.custom_linear_solve(
+        product,
+        b,
+        solve=lambda _, v: jax.scipy.linalg.lu_solve(factors, v),
+        transpose_solve=lambda _, v: jax.scipy.linalg.lu_solve(factors, v, trans=1),
+    )
+
+
+@eqx.filter_jit
+def _tangent(residual: Callable, solution: PyTree, args: tuple, args_dot: tuple, method: Method, chunk: int) -> PyTree:
+    """Solve F_x dx = −F_p dp at the solution."""
+    flat, unravel = ravel_pytree(solution)
+
+    def of_state(v: Array) -> Array:
+        return ravel_pytree(residual(unravel(v), *args))[0]
+
+    def of_args(args: tuple) -> Array:
+        return ravel_pytree(residual(solution, *args))[0]
+
+    _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
+    _, product = jax.linearize(of_state, flat)
+    return unravel(_solve(product, -push, method, chunk))
+
+
+def attach(
+    residual: Callable[..., PyTree],
+    solution: PyTree,
+    *args: Any,
+    method: Method = "dense",
+    chunk: int = CHUNK,
+) -> PyTree:
+    """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
+
+    The value is `solution` unchanged; dx = −(∂F/∂x)⁻¹ (∂F/∂p) dp in forward and reverse mode, to any order, under jit
+    and vmap. The solution must have converged at these args: what it misses is missing in the derivative too.
+
+    method: "dense" makes and factorises the Jacobian once (`chunk` columns at a time) for all directions; "gmres"
+    needs no matrix. Derivatives flow through `args` only, not through arrays that `residual` closes over.
+
+    Raises InputError where `method` is unknown.
+    """
+    _check(method)
+
+    @eqx.filter_custom_jvp
+    def value(solution: PyTree, args: tuple) -> PyTree:
+        return solution
+
+    @value.def_jvp
+    def rule(primals: tuple, tangents: tuple) -> tuple:
+        # The value again, and not `solution`: second derivatives must see how it moves.
+        x = value(*primals)
+        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk)
+
+    return value(jax.lax.stop_gradient(solution), traceable(args))
+
+
+def implicit_orbit(
+    residual: Callable[..., PyTree],
+    solver: Callable[..., Outcome],
+    *,
+    method: Method = "dense",
+    chunk: int = CHUNK,
+) -> Callable[..., PyTree]:
+    """Make x(*args), the solution of residual(x, *args) = 0 that solver(*args) finds, differentiable both ways.
+
+    solver(*args) runs on host and returns an Outcome; the derivative costs one linear solve (see `attach`), whatever
+    the solver did. The function returned works under grad, jacfwd, jacrev, jvp and vjp but not under jit, where no
+    number is known: there, solve beforehand and `attach`.
+
+    Raises InputError where it is called under jit or vmap, or where the solver does not converge.
+    """
+    _check(method)
+
+    @eqx.filter_custom_jvp
+    def orbit(args: tuple) -> PyTree:
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(args)):
+            raise InputError(
+                "Arguments of an implicit orbit must be concrete, but jit or vmap traces them: solve first and `attach`"
+            )
+        found = solver(*args)
+        if not found.converged:
+            raise InputError(f"Argument `solver` must converge at the arguments asked for, but: {found.why}")
+        return found.x
+
+    @orbit.def_jvp
+    def rule(primals: tuple, tangents: tuple) -> tuple:
+        x = orbit(*primals)
+        return x, _tangent(residual, x, primals[0], tangents[0], method, chunk)
+
+    return lambda *args: orbit(traceable(args))
+
+
+def _check(method: str) -> None:
+    if method not in ("dense", "gmres"):
+        raise InputError(f"Argument `method` must be 'dense' or 'gmres', but is {method!r}")

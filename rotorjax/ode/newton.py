@@ -1,0 +1,99 @@
+"""Newton's method on host with a line search, over dense (full, chord, Broyden) or Krylov linear solves."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import PyTree
+
+from rotorjax.ode.linear import Dense
+from rotorjax.ode.outcome import Log, Measure, Outcome, flat_value, flatten, relative_rms, traceable
+from rotorjax.ode.structure import require_like
+
+
+class LinearSolve(Protocol):
+    """Where Newton gets its direction from; `memory` is whatever the method reuses from step to step."""
+
+    def direction(self, f: Callable, unravel: Callable, x: Any, args: PyTree, value: Any, memory: Any) -> tuple:
+        """Return (direction, memory) with J direction ≈ −value."""
+        ...
+
+    def learn(self, memory: Any, step: np.ndarray, change: np.ndarray, ratio: float) -> Any:
+        """Return memory after a step that changed the residual by `change` and its size by `ratio`; None forgets."""
+        ...
+
+
+SMALLEST_STEP = 2.0**-10
+
+
+def newton(
+    residual: Callable[..., PyTree],
+    x0: PyTree,
+    *args: Any,
+    linear: LinearSolve | None = None,
+    tol: float = 1e-10,
+    max_iterations: int = 30,
+    measure: Measure = relative_rms,
+    memory: Any = None,
+    progress: bool = False,
+) -> Outcome:
+    """Find residual(x, *args) = 0 from x0 by Newton's method with backtracking on the residual's size.
+
+    x0: pytree of floating-point arrays; `residual` returns the same structure. linear: `Dense(...)` (default) or
+    `Krylov(...)`. measure(f, x): size of the residual, relative rms by default; `tol` is compared with it. memory: that
+    of an earlier Outcome, so that a continuation can go on with a factorised Jacobian.
+
+    A step is halved until the residual falls (Armijo, 1e-4); where a reused Jacobian finds no descent it is made anew
+    before giving up. Numbers in `args` may change without compiling again, as long as `residual` is the same function.
+    A run that diverges, stalls or is interrupted returns the best iterate with `converged` False and says why.
+
+    Raises InputError where x0 is not made of finite floating-point arrays or `residual` returns another structure.
+    """
+    linear = Dense() if linear is None else linear
+    flat, unravel = flatten(x0)
+    args = traceable(args)
+    require_like(eqx.filter_eval_shape(residual, x0, *args), x0, "residual(x, ...)")
+
+    def evaluate(x: np.ndarray) -> np.ndarray:
+        return np.asarray(flat_value(residual, unravel, jnp.asarray(x, flat.dtype), args))
+
+    x = np.asarray(flat)
+    with Log("newton", tol, max_iterations, progress) as log:
+        f = evaluate(x)
+        size = measure(f, x)
+        done = log.note(x, size)
+        if not np.isfinite(size):
+            log.why = "the residual is not finite at the start"
+        while not done and np.isfinite(size) and len(log.residuals) <= max_iterations:
+            fresh = memory is None
+            direction, memory = linear.direction(residual, unravel, jnp.asarray(x), args, jnp.asarray(f), memory)
+            share, new, new_f, new_size = _backtrack(evaluate, measure, x, direction, size)
+            if new_size >= size:
+                memory = None
+                if fresh:
+                    log.why = (
+                        f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
+                        "lowers the residual (a fold, a kink or the limit of precision)"
+                    )
+                    break
+                continue
+            done = log.note(new, new_size)
+            memory = linear.learn(memory, new - x, new_f - f, new_size / size) if share == 1 else None
+            x, f, size = new, new_f, new_size
+    return log.outcome(unravel, memory)
+
+
+def _backtrack(
+    evaluate: Callable[[np.ndarray], np.ndarray], measure: Measure, x: np.ndarray, direction: np.ndarray, size: float
+) -> tuple[float, np.ndarray, np.ndarray, float]:
+    """Halve the step until the residual falls; returns share, iterate, residual and size of the last one tried."""
+    share = 1.0
+    while True:
+        new = x + share * direction
+        f = evaluate(new)
+        found = measure(f, new)
+        if found <= (1 - 1e-4 * share) * size or share <= SMALLEST_STEP:
+            return share, new, f, found
+        share /= 2

@@ -1,0 +1,121 @@
+"""What an iterative solver hands back, how a residual is measured, and how progress is shown."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float, PyTree
+from tqdm import tqdm
+
+from rotorjax.errors import InputError
+
+Measure = Callable[[np.ndarray, np.ndarray], float]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """End of an iteration, converged or not.
+
+    x: best iterate found. residual: its measure. residuals: measure of every iterate, the start included. iterations:
+    how many were made. converged: whether residual ≤ tol. why: one sentence. wall_time: seconds, compilation included.
+    memory: what a following solve can reuse (a factorised Jacobian), or None.
+    """
+
+    x: PyTree
+    residual: float
+    residuals: tuple[float, ...]
+    iterations: int
+    converged: bool
+    why: str
+    wall_time: float
+    memory: Any = None
+
+
+def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
+    """Root mean square of f over that of x (over 1 where x is zero); infinite where f is not finite."""
+    if not np.all(np.isfinite(f)):
+        return float("inf")
+    scale = float(np.sqrt(np.mean(np.square(x))))
+    return float(np.sqrt(np.mean(np.square(f)))) / (scale if scale > 0 else 1.0)
+
+
+def flatten(x: PyTree) -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
+    """Flat vector of a state and the way back, after checking that it is made of finite floating-point numbers.
+
+    Raises InputError where a leaf is not.
+    """
+    leaves, _ = jax.tree_util.tree_flatten_with_path(x)
+    for path, leaf in leaves:
+        if not jnp.issubdtype(jnp.result_type(leaf), jnp.floating):
+            raise InputError(
+                f"Argument `x0` must hold floating-point arrays only, but {jax.tree_util.keystr(path) or 'it'} "
+                f"is {jnp.result_type(leaf)}: cast it, or pass it among the arguments"
+            )
+    flat, unravel = ravel_pytree(x)
+    if not bool(jnp.all(jnp.isfinite(flat))):
+        raise InputError("Argument `x0` must be finite, but holds NaN or infinity")
+    return flat, unravel
+
+
+def traceable(args: PyTree) -> PyTree:
+    """Make Python and numpy numbers into arrays, so that jitted kernels take new values without compiling again."""
+    number = (float, complex, np.ndarray, np.floating)
+    return jax.tree.map(lambda v: jnp.asarray(v) if isinstance(v, number) else v, args)
+
+
+@eqx.filter_jit
+def flat_value(f: Callable, unravel: Callable, x: Float[Array, " n"], args: PyTree) -> Float[Array, " m"]:
+    """f(x, *args) between flat vectors."""
+    return ravel_pytree(f(unravel(x), *args))[0]
+
+
+class Log:
+    """Residual history, best iterate, clock and progress bar of one iteration, kept whatever ends it."""
+
+    def __init__(self, title: str, tol: float, max_iterations: int, progress: bool) -> None:
+        """Start the clock; `progress` shows a bar."""
+        self.tol, self.limit = tol, max_iterations
+        self.residuals: list[float] = []
+        self.best, self.why = float("inf"), ""
+        self.best_x: Any = None
+        self._bar = tqdm(total=max_iterations, desc=title, disable=not progress)
+        self._start = time.perf_counter()
+
+    def note(self, x: Any, residual: float) -> bool:
+        """Record an iterate; True where it is good enough."""
+        self._bar.update(1 if self.residuals else 0)
+        self._bar.set_postfix_str(f"residual {residual:.2e}")
+        self.residuals.append(residual)
+        if self.best_x is None or residual < self.best:
+            self.best, self.best_x = residual, x
+        if residual <= self.tol:
+            self.why = f"residual {residual:.2e} is within {self.tol:.1e}"
+        return residual <= self.tol
+
+    def __enter__(self) -> "Log":
+        """Use as `with Log(...) as log`: an interrupt ends the iteration and keeps what it had."""
+        return self
+
+    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> bool:
+        """Close the bar; swallow a keyboard interrupt once there is something to keep."""
+        self._bar.close()
+        if kind is KeyboardInterrupt and self.residuals:
+            self.why = f"interrupted at residual {self.best:.2e}"
+            return True
+        return False
+
+    def outcome(self, unravel: Callable, memory: Any = None) -> Outcome:
+        """Pack up the best iterate."""
+        made = len(self.residuals) - 1
+        converged = self.best <= self.tol
+        why = self.why or f"residual {self.best:.2e} is above {self.tol:.1e} after {made} of {self.limit} iterations"
+        spent = time.perf_counter() - self._start
+        x = unravel(jnp.asarray(self.best_x))
+        return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, memory)

@@ -1,0 +1,85 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.errors import InputError
+from rotorjax.ode.implicit import attach, implicit_orbit
+from rotorjax.ode.newton import newton
+
+N = 12
+COUPLING = jnp.array(np.random.default_rng(3).normal(size=(N, N)) / 4)
+
+
+def residual(x, p):
+    y = jnp.concatenate([x["a"], x["b"]])
+    f = y + 0.5 * jnp.tanh(COUPLING @ y) - jnp.sin(p["s"] * jnp.arange(N)) * p["g"]
+    return {"a": f[:5], "b": f[5:]}
+
+
+def solver(p):
+    return newton(residual, {"a": jnp.zeros(5), "b": jnp.zeros(N - 5)}, p, tol=1e-14)
+
+
+P = {"s": jnp.array(0.7), "g": jnp.array([1.2])}
+
+
+@pytest.mark.parametrize("method", ["dense", "gmres"])
+def test_derivative_ladder(method):
+    orbit = implicit_orbit(residual, solver, method=method, chunk=5)
+
+    def output(p):
+        x = orbit(p)
+        return jnp.sum(x["a"] ** 2) + jnp.prod(jnp.cos(x["b"]))
+
+    forward, reverse = jax.jacfwd(output)(P), jax.jacrev(output)(P)
+    for name in P:
+        eps = 1e-5
+        up, down = ({**P, name: P[name] + e} for e in (eps, -eps))
+        difference = (output(up) - output(down)) / (2 * eps)
+        np.testing.assert_allclose(jnp.squeeze(forward[name]), difference, rtol=1e-8)
+        np.testing.assert_allclose(reverse[name], forward[name], rtol=1e-10)
+
+
+@pytest.mark.parametrize("method", ["dense", "gmres"])
+def test_attach_under_jit_and_vmap(method):
+    solution = solver(P).x
+
+    def output(p):
+        return attach(residual, solution, p, method=method)["a"]
+
+    eager, jitted = jax.jacfwd(output)(P), jax.jit(jax.jacrev(output))(P)
+    np.testing.assert_allclose(jitted["s"], eager["s"], rtol=1e-9)
+    many = jax.vmap(lambda d: jax.jvp(output, (P,), ({"s": d, "g": jnp.zeros(1)},))[1])(jnp.arange(3.0))
+    np.testing.assert_allclose(many[2], 2 * eager["s"], rtol=1e-9)
+    np.testing.assert_array_equal(output(P), solution["a"])
+
+
+def test_second_derivative():
+    def cube(x, p):
+        return x**3 - p
+
+    found = jax.hessian(lambda p: attach(cube, jnp.array([2.0]), p)[0])(8.0)
+    np.testing.assert_allclose(found, -2 / 9 * 8 ** (-5 / 3), rtol=1e-12)
+
+
+def test_one_linear_solve_whatever_the_solver_did():
+    """The derivative does not unroll: the solver sees concrete numbers and runs once a value, once a derivative."""
+    runs = []
+
+    def counted(p):
+        runs.append(p)
+        return solver(p)
+
+    jax.jacfwd(lambda p: implicit_orbit(residual, counted)(p)["a"])(P)
+    assert len(runs) == 1
+
+
+def test_bad_input():
+    orbit = implicit_orbit(residual, solver)
+    with pytest.raises(InputError, match="concrete"):
+        jax.jit(orbit)(P)
+    with pytest.raises(InputError, match="must converge"):
+        implicit_orbit(residual, lambda p: newton(residual, solver(p).x, p, tol=1e-30, max_iterations=1))(P)
+    with pytest.raises(InputError, match="dense"):
+        attach(residual, solver(P).x, P, method="lu")  # type: ignore[arg-type]
