@@ -1,0 +1,139 @@
+"""Shaping functions Φ, velocity potentials Ψ and the velocity of one set of steady states anywhere (Appendices C–E).
+
+The wake is the rigid cylinder below the disk along z; velocities over ΩR in the hub frame (z up). With
+∂Ψ/∂z̄ = Φ, z̄ down, a state a gives the downward velocity aΦ on and above the disk.
+
+Below the disk, at the point A with D its mirror image above and B the disk plane's upper face on the same streamline:
+axial  v_A = v_B + s(v_B − v_D), in-plane q_A = q_B − s(q_B − q_D),  s = (−1)^{n+m+1}.
+That is 2v_B − v_D for pressure modes (Eq. 32) and v_A = v_D for mass sources. Eq. 7 with the printed τ† = (−1)^{j+1}τ
+holds only with the adjoint terms at ψ + π; this form needs no such turn. It is exact outside the cylinder too, where
+v_B = 0 for pressure modes (tests/potential/test_field.py integrates along streamlines).
+"""
+
+from collections.abc import Callable
+from math import factorial, log, pi, sqrt
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.potential.ellipsoidal import Ellipsoidal, ellipsoidal
+from rotorjax.potential.legendre import Pairs, double_factorial, k_constant, legendre_p, legendre_q
+from rotorjax.potential.modes import ModeTable
+
+
+def _harmonics(highest: int, at: Ellipsoidal) -> tuple[list[Array], list[Array]]:
+    """(1−ν²)^{m/2} cos mψ and sin mψ for m = 0 … highest, as polynomials: smooth on the axis."""
+    cosines, sines = [jnp.ones_like(at.nu)], [jnp.zeros_like(at.nu)]
+    for _ in range(highest):
+        c, s = cosines[-1], sines[-1]
+        cosines.append(at.cosine * c - at.sine * s)
+        sines.append(at.cosine * s + at.sine * c)
+    return cosines, sines
+
+
+def _by_mode(modes: ModeTable, radial: Float[Array, "L ..."], at: Ellipsoidal) -> Float[Array, "M ..."]:
+    """Multiply functions of (ν, η), one for each pair of `modes`, by (1−ν²)^{m/2} {cos, sin} mψ."""
+    cosines, sines = _harmonics(int(modes.m.max()), at)
+    angular = jnp.stack([(cosines if mode.kind == "cos" else sines)[mode.m] for mode in modes.modes])
+    return radial[modes.pair_index] * angular
+
+
+def _radial(pairs: Pairs, at: Ellipsoidal) -> Float[Array, "L ..."]:
+    return legendre_p(pairs, at.nu) * legendre_q(pairs, at.eta)
+
+
+def pressure_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
+    """Return Φ_n^m = P̄_n^m(ν) Q̄_n^m(iη) {cos, sin} mψ at hub-frame points over R (Eqs. 6, 29)."""
+    at = ellipsoidal(points)
+    return _by_mode(modes, _radial(modes.pairs, at), at)
+
+
+def disk_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
+    """Return Φ of the disk plane's upper face at the streamline's foot (x, y, 0): P̄ {cos, sin} mψ on the disk."""
+    return pressure_functions(modes, points * jnp.array([1, 1, 0], points.dtype))
+
+
+def sigma(m: int, n: int) -> float:
+    """Return σ_n^m of Eq. 26."""
+    return 1 / (k_constant(m, n) * sqrt((2 * n + 1) * (2 * n + 3) * ((n + 1) ** 2 - m**2)))
+
+
+def zeta(m: int, n: int) -> float:
+    """Return ζ_n^m of Eq. 26, n > m."""
+    return 1 / (k_constant(m, n) * sqrt((4 * n**2 - 1) * (n**2 - m**2)))
+
+
+def _diagonal_remainder(r: int, at: Ellipsoidal) -> Float[Array, "*N"]:
+    """The second term of Ψ_r^r (Eqs. 43–45) without (1−ν²)^{r/2} {cos, sin} rψ.
+
+    Two slips of the print: Eq. 44 lacks j! in the denominator (without it the term is not harmonic for r ≥ 3), and
+    a = 1 in Eq. 45.
+    """
+    if r == 0:
+        return -2 / pi * jnp.log(1 + at.nu) - jnp.log(1 + at.eta**2) / pi
+    total = jnp.zeros_like(at.nu)
+    for j in range(r - 1, -1, -1):
+        c = factorial(r - 1) * 2 ** (r - 1 - j) * (-1) ** j / (factorial(j) * factorial(r - 1 - j) * (r + j))
+        total = total * (1 - at.nu) + c
+    scale = 2 / pi * sqrt(double_factorial(2 * r) / double_factorial(2 * r + 1))
+    return scale * total / ((1 + at.nu) ** r * (1 + at.eta**2) ** (r / 2))
+
+
+def velocity_potentials(
+    modes: ModeTable, points: Float[Array, "*N 3"], outer_radius: float = 1e3
+) -> Float[Array, "M ..."]:
+    """Return Ψ with ∂Ψ/∂z̄ = Φ (Eqs. 26, 43–45) at hub-frame points on or above the disk, over R.
+
+    outer_radius: R_max of Eq. 45, a constant in Ψ_0^0 that no velocity depends on. The n = m terms are singular on the
+    axis below the disk.
+    """
+    at = ellipsoidal(points)
+    needed = [(m, n + 1) for m, n in modes.pairs] + [(m, n - 1) for m, n in modes.pairs if n > m]
+    pairs = tuple(dict.fromkeys(needed))
+    radial = dict(zip(pairs, _radial(pairs, at), strict=True))
+    rows = []
+    for m, n in modes.pairs:
+        row = sigma(m, n) * radial[m, n + 1]
+        if n > m:
+            row = row + zeta(m, n) * radial[m, n - 1]
+        else:
+            row = row + _diagonal_remainder(m, at) + (2 / pi * log(outer_radius) if m == 0 else 0.0)
+        rows.append(row)
+    return _by_mode(modes, jnp.stack(rows), at)
+
+
+def _along(function: Callable[[Array], Array], points: Float[Array, "*N 3"], axis: int) -> Array:
+    """∂/∂x or ∂/∂y of a function of points, each value depending on its own point."""
+    return jax.jvp(function, (points,), (jnp.zeros_like(points).at[..., axis].set(1),))[1]
+
+
+def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
+    """Return the velocity (hub frame) of each mode's unit state on and above the disk: ∇Ψ, the axial one being −Φ."""
+
+    def potentials(p: Array) -> Array:
+        return velocity_potentials(modes, p)
+
+    return jnp.stack([_along(potentials, points, 0), _along(potentials, points, 1), -pressure_functions(modes, points)])
+
+
+def _mirrored(points: Float[Array, "*N 3"]) -> Float[Array, "*N 3"]:
+    """Points below the disk moved to their mirror image above."""
+    return jnp.concatenate([points[..., :2], jnp.abs(points[..., 2:])], axis=-1)
+
+
+def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
+    """Return the downward velocity of each mode's unit state at any hub-frame points."""
+    above = pressure_functions(modes, _mirrored(points))
+    if modes.parity == "even":
+        return above
+    return jnp.where(points[..., 2] >= 0, above, 2 * disk_functions(modes, points) - above)
+
+
+def field_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
+    """Return the velocity (hub frame) of each mode's unit state at any hub-frame points."""
+    above = velocity_functions(modes, _mirrored(points))[:2]
+    if modes.parity == "even":
+        disk = velocity_functions(modes, points * jnp.array([1, 1, 0], points.dtype))[:2]
+        above = jnp.where(points[..., 2] >= 0, above, 2 * disk - above)
+    return jnp.concatenate([above, -axial_functions(modes, points)[None]])

@@ -1,0 +1,106 @@
+"""The ground as mass sources on a disk under the rotor (Appendices D, E).
+
+The ground disk is the rotor's footprint along the wake, which stays vertical: its point (x, y) lies at the depth
+d = h − x tan δ below the rotor's point (x, y) (Eq. 9; x aft). Both maps use that depth: the rotor's wake reaches the
+ground's (x, y) at depth d, and the ground's flow reaches the rotor's (x, y) from the distance d. Only the normal
+component of the incoming flow, cos δ times the axial one, meets the sources; the tangential one slides along the plane.
+
+The integrals of Eq. 37 are taken with Gauss–Legendre nodes in ν and equal steps in ψ instead of the recommended
+trapezoidal rule: the integrands are analytic in ν and periodic in ψ, so both rules converge faster than any power,
+and a few dozen nodes reach rounding error where 400 trapezoidal points do not
+(tests/potential/test_ground_source.py). The states c = G a are used directly; the printed Eq. 40 for the strengths,
+S = V_e G, should read S = G V_e.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.potential.ellipsoidal import ellipsoidal
+from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions
+from rotorjax.potential.modes import ModeTable
+
+
+class Correction(eqx.Module):
+    """The empirical factor b^{η^p} on the r = j terms away from the ground (Eqs. 46, 47).
+
+    b (): base in (0, 1], the paper's π/7 by default; p (): exponent, the paper's 2.
+    """
+
+    b: Float[Array, ""]
+    p: Float[Array, ""]
+
+    def factor(self, eta: Float[Array, "*N"]) -> Float[Array, "*N"]:
+        """Return b^{η^p}, one on the ground disk (η = 0)."""
+        on_ground = eta <= 0  # d(η^p) is infinite there for p < 1 and 0/0 through the logarithm
+        power = jnp.where(on_ground, 0.0, jnp.where(on_ground, 1.0, eta) ** self.p)
+        return self.b**power
+
+
+def correction(b: float = float(np.pi / 7), p: float = 2.0) -> Correction:
+    """Make the correction factor. Raises InputError where b is not in (0, 1] or p is not positive."""
+    if not 0 < b <= 1:
+        raise InputError(f"Argument `b` must lie in (0, 1] (1 switches the correction off), but is {b}")
+    if not (np.isfinite(p) and p > 0):
+        raise InputError(f"Argument `p` must be positive and finite, but is {p}")
+    return Correction(jnp.asarray(b, float), jnp.asarray(p, float))
+
+
+class DiskQuadrature(eqx.Module):
+    """Quadrature over the disk, static: `nodes_nu` Gauss–Legendre nodes in ν and `nodes_psi` equal steps in ψ."""
+
+    nodes_nu: int = eqx.field(static=True, default=24)
+    nodes_psi: int = eqx.field(static=True, default=32)
+
+    def rule(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return x, y, ν and the weights of ∫₀¹ dν ∫ dψ/2π at the N nodes, each (N,), hub frame."""
+        node, weight = np.polynomial.legendre.leggauss(self.nodes_nu)
+        nu, psi = np.meshgrid(
+            (node + 1) / 2, 2 * np.pi * (np.arange(self.nodes_psi) + 0.5) / self.nodes_psi, indexing="ij"
+        )
+        weights = np.broadcast_to((weight / 2 / self.nodes_psi)[:, None], nu.shape)
+        r = np.sqrt(1 - nu**2)
+        return (r * np.cos(psi)).ravel(), (r * np.sin(psi)).ravel(), nu.ravel(), weights.ravel()
+
+
+def depth(ground: Plane, x: Float[Array, "*N"]) -> Float[Array, "*N"]:
+    """Return the depth of the plane under the hub-frame station x along the shaft, over R (Eq. 9)."""
+    return ground.height - x * jnp.tan(ground.slope)
+
+
+def rotor_on_ground(
+    modes: ModeTable, ground: Plane, x: Float[Array, "*N"], y: Float[Array, "*N"]
+) -> Float[Array, "M ..."]:
+    """Return the flow of unit rotor states into the plane at its points (x, y), along its normal (Eqs. 32, 34)."""
+    points = jnp.stack([x, y, -depth(ground, x)], axis=-1)
+    return jnp.cos(ground.slope) * axial_functions(modes, points)
+
+
+def ground_on_rotor(
+    modes: ModeTable, ground: Plane, correction: Correction, points: Float[Array, "*N 3"]
+) -> Float[Array, "G ..."]:
+    """Return the upward velocity of unit ground states at hub-frame points above the plane (Eqs. 35, 46)."""
+    above = jnp.stack([points[..., 0], points[..., 1], points[..., 2] + depth(ground, points[..., 0])], axis=-1)
+    functions = pressure_functions(modes, above)
+    diagonal = jnp.asarray(modes.diagonal).reshape((-1,) + (1,) * (points.ndim - 1))
+    return functions * jnp.where(diagonal, correction.factor(ellipsoidal(above).eta), 1.0)
+
+
+def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "G ..."]:
+    """Return the normal velocity of unit ground states on the ground disk itself."""
+    return disk_functions(modes, jnp.stack([x, y, jnp.zeros_like(x)], axis=-1))
+
+
+def correlation(rotor: ModeTable, sources: ModeTable, ground: Plane, quadrature: DiskQuadrature) -> Float[Array, "G M"]:
+    """Return the velocity correlation matrix G of c = G a (Eqs. 36, 37, 42), cos δ included.
+
+    The source functions are orthonormal over dν dψ, so projecting the incoming flow on them is the least-squares
+    solution.
+    """
+    dtype = ground.height.dtype
+    x, y, _, weights = (jnp.asarray(v, dtype) for v in quadrature.rule())
+    share = jnp.where(sources.m == 0, 1.0, 2.0).astype(dtype)[:, None]
+    return share * (self_flow(sources, x, y) * weights) @ rotor_on_ground(rotor, ground, x, y).T

@@ -1,0 +1,161 @@
+"""The finite-state inflow model of a rotor in hover, in or out of ground effect: the functions that users call.
+
+    model = finite_state_model(plane(1.0, 15.0), harmonics=1, ground_harmonics=1)
+    tau = loading.from_distribution(dct_dr, r, weights, psi, model.modes)
+    state = steady_state(model, tau)
+    lam = inflow(state, r, psi, model)
+
+Lengths over R, velocities over ΩR, hub frame (x aft, y to starboard, z up); inflow positive down.
+"""
+
+from typing import Literal, get_args
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.frames import disk_points
+from rotorjax.ground import Plane
+from rotorjax.potential.field import field_functions, pressure_functions
+from rotorjax.potential.ground_source import (
+    Correction,
+    DiskQuadrature,
+    correction,
+    correlation,
+    ground_on_rotor,
+    rotor_on_ground,
+    self_flow,
+)
+from rotorjax.potential.loading import thrust_coefficient
+from rotorjax.potential.modes import ModeTable, ground_modes, rotor_modes
+
+MassFlow = Literal["paper", "linear"]
+
+
+class FiniteStateModel(eqx.Module):
+    """The model's static choices and its parameters.
+
+    modes: rotor table, M modes; sources: ground table, G modes (static). ground: `Plane` or None. correction: b and
+    p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). mass_flow (static):
+    "paper" gives V to a_1^0 and 2V to all others (Eq. 4); "linear" gives V to all.
+    """
+
+    modes: ModeTable
+    sources: ModeTable
+    ground: Plane | None
+    correction: Correction
+    quadrature: DiskQuadrature
+    mass_flow: MassFlow = eqx.field(static=True)
+
+
+class FiniteState(eqx.Module):
+    """Velocity states. a (M,): rotor; c (G,): ground sources, zero without ground; both over ΩR."""
+
+    a: Float[Array, " M"]
+    c: Float[Array, " G"]
+
+
+def finite_state_model(
+    ground: Plane | None = None,
+    harmonics: int = 0,
+    radial_terms: int = 3,
+    ground_harmonics: int = 0,
+    ground_radial_terms: int = 5,
+    b: float = float(np.pi / 7),
+    p: float = 2.0,
+    mass_flow: MassFlow = "paper",
+    quadrature: DiskQuadrature | None = None,
+) -> FiniteStateModel:
+    """Make the model; its defaults are the paper's for level ground (τ₁, τ₃, τ₅; b^{η^p} with π/7 and 2).
+
+    harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
+    terms of each harmonic. Raises InputError where a count, b, p or mass_flow is not allowed.
+    """
+    if mass_flow not in get_args(MassFlow):
+        raise InputError(f"Argument `mass_flow` must be one of {get_args(MassFlow)}, but is {mass_flow!r}")
+    quadrature = quadrature or DiskQuadrature()
+    least = 2 * max(harmonics, ground_harmonics) + 1
+    if quadrature.nodes_psi < least:
+        raise InputError(f"Argument `quadrature` must have at least {least} nodes in ψ, but has {quadrature.nodes_psi}")
+    return FiniteStateModel(
+        rotor_modes(harmonics, radial_terms),
+        ground_modes(ground_harmonics, ground_radial_terms),
+        ground,
+        correction(b, p),
+        quadrature,
+        mass_flow,
+    )
+
+
+def mass_flow_parameters(model: FiniteStateModel, tau: Float[Array, " M"]) -> Float[Array, " M"]:
+    """Return the diagonal of V̂ (Eq. 4) with V = √(C_T/2); τ must carry a positive thrust."""
+    v = jnp.sqrt(thrust_coefficient(tau, model.modes) / 2)
+    if model.mass_flow == "linear":
+        return jnp.full_like(tau, 1) * v
+    first = np.arange(len(model.modes)) == model.modes.index(0, 1)
+    return jnp.where(first, v, 2 * v)
+
+
+def steady_state(model: FiniteStateModel, tau: Float[Array, " M"]) -> FiniteState:
+    """Return the states of a steady loading in hover, a = V̂⁻¹τ (Eq. 3) and c = G a (Eq. 36).
+
+    tau: pressure coefficients of `model.modes` with positive C_T. Raises InputError where its shape differs.
+    """
+    if tau.shape != (len(model.modes),):
+        raise InputError(
+            f"Argument `tau` must have shape ({len(model.modes)},) as the model's modes, but has {tau.shape}"
+        )
+    a = tau / mass_flow_parameters(model, tau)
+    if model.ground is None:
+        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
+    return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
+
+
+def axial_velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N"]:
+    """Return the downward velocity on and above the disk at hub-frame points, the ground's included (over ΩR)."""
+    down = jnp.tensordot(state.a, pressure_functions(model.modes, points), 1)
+    if model.ground is None:
+        return down
+    return down - jnp.tensordot(state.c, ground_on_rotor(model.sources, model.ground, model.correction, points), 1)
+
+
+def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N 3"]:
+    """Return the induced velocity at hub-frame points over R, in the hub frame over ΩR.
+
+    On, above and below the disk, inside and outside the wake cylinder. The ground's part is its axial component
+    only, as in the paper, and holds above the plane.
+    """
+    rotor = jnp.tensordot(state.a, field_functions(model.modes, points), [[0], [1]])
+    if model.ground is not None:
+        up = jnp.tensordot(state.c, ground_on_rotor(model.sources, model.ground, model.correction, points), 1)
+        rotor = rotor.at[2].add(up)
+    return jnp.moveaxis(rotor, 0, -1)
+
+
+def inflow(
+    state: FiniteState, r: Float[Array, " R"], psi: Float[Array, " K"], model: FiniteStateModel
+) -> Float[Array, "K R"]:
+    """Return λ over ΩR, positive down, at radii r (over R) and azimuths psi (rad), the ground's effect included."""
+    return axial_velocity(state, disk_points(r[None, :], psi[:, None]), model)
+
+
+def mean_inflow(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
+    """Return the area-weighted mean of λ over the whole disk, over ΩR."""
+    x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
+    points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
+    return (2 * nu * weights) @ axial_velocity(state, points, model)  # r dr = −ν dν
+
+
+def ground_normal_velocity_rms(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
+    """Return the rms of the normal velocity left on the plane over that of the flow into it, inside the wake radius.
+
+    Area-weighted. Raises InputError where the model has no ground.
+    """
+    if model.ground is None:
+        raise InputError("Argument `model` must have a ground, but its ground is None")
+    x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
+    into = state.a @ rotor_on_ground(model.modes, model.ground, x, y)
+    left = into - state.c @ self_flow(model.sources, x, y)
+    return jnp.sqrt(((nu * weights) @ left**2) / ((nu * weights) @ into**2))

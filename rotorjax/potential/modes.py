@@ -1,0 +1,122 @@
+"""Mode tables: which (m, n) and whether cosine or sine; the static choice that sets every array size."""
+
+from collections.abc import Iterable
+from typing import Literal, NamedTuple
+
+import equinox as eqx
+import numpy as np
+
+from rotorjax.errors import InputError
+
+HIGHEST_DEGREE = 15  # up to here the Legendre functions are proved to 1e-12
+
+
+class Mode(NamedTuple):
+    """One term of the expansion: harmonic m, degree n, and "cos" or "sin"."""
+
+    m: int
+    n: int
+    kind: Literal["cos", "sin"]
+
+
+class ModeTable(eqx.Module):
+    """M modes of one parity, all static.
+
+    modes: tuple of M `Mode`; parity: "odd" where n + m is odd (pressure jump, the rotor), "even" where it is even (mass
+    source, the ground).
+    """
+
+    modes: tuple[Mode, ...] = eqx.field(static=True)
+    parity: Literal["odd", "even"] = eqx.field(static=True)
+
+    def __init__(self, modes: Iterable[Mode], parity: Literal["odd", "even"]):
+        """Check the modes and freeze them.
+
+        Raises InputError where a mode has the wrong parity, n < m, a sine at m = 0, or a degree above 15.
+        """
+        self.modes = tuple(Mode(*mode) for mode in modes)
+        self.parity = parity
+        if not self.modes:
+            raise InputError("Argument `modes` must hold at least one mode, but is empty")
+        for mode in self.modes:
+            m, n, kind = mode
+            if not 0 <= m <= n <= HIGHEST_DEGREE:
+                raise InputError(f"Argument `modes` must keep 0 <= m <= n <= {HIGHEST_DEGREE}, but has {mode}")
+            if (n + m) % 2 != (parity == "odd"):
+                raise InputError(f"Argument `modes` must have n + m {parity}, but has {mode}")
+            if kind not in (("cos",) if m == 0 else ("cos", "sin")):
+                raise InputError(f"Argument `modes` must be cosine, or sine with m > 0, but has {mode}")
+        if len(set(self.modes)) < len(self.modes):
+            raise InputError("Argument `modes` must not repeat a mode")
+
+    def __len__(self) -> int:
+        """Return M."""
+        return len(self.modes)
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """The different (m, n), in order."""
+        return tuple(dict.fromkeys((mode.m, mode.n) for mode in self.modes))
+
+    @property
+    def pair_index(self) -> np.ndarray:
+        """Position of each mode's (m, n) in `pairs`, (M,)."""
+        index = {pair: i for i, pair in enumerate(self.pairs)}
+        return np.array([index[mode.m, mode.n] for mode in self.modes])
+
+    @property
+    def m(self) -> np.ndarray:
+        """Harmonics, (M,)."""
+        return np.array([mode.m for mode in self.modes])
+
+    @property
+    def n(self) -> np.ndarray:
+        """Degrees, (M,)."""
+        return np.array([mode.n for mode in self.modes])
+
+    @property
+    def diagonal(self) -> np.ndarray:
+        """Whether n = m, (M,): the r = j terms of Appendix E."""
+        return self.m == self.n
+
+    def index(self, m: int, n: int, kind: Literal["cos", "sin"] = "cos") -> int:
+        """Position of a mode. Raises InputError where the table lacks it."""
+        if (mode := Mode(m, n, kind)) not in self.modes:
+            raise InputError(f"The mode table must contain {mode}, but holds {self.modes}")
+        return self.modes.index(mode)
+
+
+def mode_table(first_degree: int, harmonics: int, radial_terms: int) -> ModeTable:
+    """Make the table n = m + first_degree, + 2, + 4, … for m = 0 … harmonics.
+
+    harmonics: the highest m (0 is axisymmetric); radial_terms: how many n for each m.
+    Raises InputError where a count is too small or a degree exceeds 15.
+    """
+    if harmonics < 0:
+        raise InputError(f"Argument `harmonics` must be at least 0 (the highest m), but is {harmonics}")
+    if radial_terms < 1:
+        raise InputError(f"Argument `radial_terms` must be at least 1, but is {radial_terms}")
+    highest = harmonics + first_degree + 2 * (radial_terms - 1)
+    if highest > HIGHEST_DEGREE:
+        raise InputError(
+            f"Arguments `harmonics`, `radial_terms` must keep degrees up to {HIGHEST_DEGREE}, but {harmonics} and "
+            f"{radial_terms} need {highest}: take fewer of either"
+        )
+    kinds = ("cos", "sin")
+    modes = [
+        Mode(m, m + first_degree + 2 * i, kind)
+        for m in range(harmonics + 1)
+        for i in range(radial_terms)
+        for kind in kinds[: 1 if m == 0 else 2]
+    ]
+    return ModeTable(modes, "odd" if first_degree % 2 else "even")
+
+
+def rotor_modes(harmonics: int = 0, radial_terms: int = 3) -> ModeTable:
+    """Make the rotor's table, n = m+1, m+3, … (Eq. 5); the default is the paper's τ₁, τ₃, τ₅."""
+    return mode_table(1, harmonics, radial_terms)
+
+
+def ground_modes(harmonics: int = 0, radial_terms: int = 5) -> ModeTable:
+    """Make the ground's table, j = r, r+2, … (Eq. 8), the r = j terms of Appendix E included."""
+    return mode_table(0, harmonics, radial_terms)
