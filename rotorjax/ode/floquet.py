@@ -142,7 +142,7 @@ def floquet(
     matrix = cast(Any, LinearOperator)((x.size, x.size), matvec=product, dtype=x.dtype)
     start = np.random.default_rng(0).normal(size=x.size)
     try:
-        values, vectors = eigs(matrix, k=count, v0=start, tol=tol, ncv=subspace)
+        values, vectors = cast(Any, eigs)(matrix, k=count, v0=start, tol=tol, ncv=subspace)
     except ArpackNoConvergence as error:
         raise InputError(
             f"Argument `count` must be one that Arnoldi reaches, but {len(error.eigenvalues)} of {count} multipliers "

@@ -1,0 +1,105 @@
+"""Handing linear models over: python-control, MATLAB, NetCDF. Files appear whole or not at all."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import xarray as xr
+
+from rotorjax.errors import InputError
+from rotorjax.ode.models import LinearModel, PeriodicModel
+
+
+def to_control(model: LinearModel) -> Any:
+    """python-control StateSpace with the model's names.
+
+    Raises InputError where python-control is not installed.
+    """
+    try:
+        import control
+    except ImportError as error:
+        raise InputError(
+            "Argument `model` needs python-control for this, but it is missing: pip install 'rotorjax[control]'"
+        ) from error
+    # Dots are its separator between systems and signals.
+    names = {key: [name.replace(".", "_") for name in getattr(model, key)] for key in ("states", "inputs", "outputs")}
+    return control.StateSpace(model.a, model.b, model.c, model.d, **names)
+
+
+def _replace(path: str | Path, write: Callable[[str], None]) -> Path:
+    """Write under a temporary name beside the target, then rename: a reader never sees half a file."""
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise InputError(f"Argument `path` must lie in a folder that exists, but {target.parent} does not")
+    handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}.", dir=target.parent)
+    os.close(handle)
+    try:
+        write(temporary)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, target)
+    finally:
+        Path(temporary).unlink(missing_ok=True)
+    return target
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _fields(model: LinearModel | PeriodicModel) -> dict[str, np.ndarray]:
+    return {key.upper(): getattr(model, key) for key in ("a", "b", "c", "d")}
+
+
+def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
+    """Write A, B, C, D (times along the third axis where periodic, as in MATLAB), names and units to a .mat file.
+
+    Raises InputError where the folder does not exist.
+    """
+    content: dict[str, Any] = _fields(model)
+    if isinstance(model, PeriodicModel):
+        content = {key: np.moveaxis(value, 0, -1) for key, value in content.items()}
+        content |= {"t": model.t, "period": model.period, "x": model.x.T, "u": model.u, "y": model.y.T}
+    for key in ("states", "inputs", "outputs", "input_units", "output_units"):
+        content[key] = np.array(getattr(model, key), dtype=object)
+    return _replace(path, lambda name: scipy.io.savemat(name, content))
+
+
+def to_dataset(model: LinearModel | PeriodicModel) -> xr.Dataset:
+    """Labelled xarray dataset: A (state, from_state), B (state, input), C (output, from_state), D (output, input)."""
+    axes = {
+        "A": ("state", "from_state"),
+        "B": ("state", "input"),
+        "C": ("output", "from_state"),
+        "D": ("output", "input"),
+    }
+    lead = ("time",) if isinstance(model, PeriodicModel) else ()
+    data = {key: (lead + axes[key], value) for key, value in _fields(model).items()}
+    coords: dict[str, Any] = {
+        "state": list(model.states),
+        "from_state": list(model.states),
+        "input": list(model.inputs),
+        "output": list(model.outputs),
+        "input_unit": ("input", list(model.input_units)),
+        "output_unit": ("output", list(model.output_units)),
+    }
+    attrs = {}
+    if isinstance(model, PeriodicModel):
+        coords["time"] = model.t
+        coords["state_unit"] = ("state", list(model.state_units))
+        data |= {"x": (("time", "state"), model.x), "y": (("time", "output"), model.y), "u": (("input",), model.u)}
+        attrs["period"] = model.period
+    return xr.Dataset(data, coords, attrs)
+
+
+def save_netcdf(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
+    """Write `to_dataset(model)` to a NetCDF file.
+
+    Raises InputError where the folder does not exist.
+    """
+    return _replace(path, lambda name: to_dataset(model).to_netcdf(name, engine="h5netcdf"))

@@ -1,0 +1,107 @@
+"""Linear models about a periodic orbit: A(t), B(t), C(t), D(t) by forward mode, a few columns at a time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Float, PyTree
+from tqdm import tqdm
+
+from rotorjax.ode.jacobian import CHUNK, dense_jacobian
+from rotorjax.ode.labels import labels, select, units_of
+from rotorjax.ode.models import PeriodicModel
+from rotorjax.ode.orbit import Orbit, require_converged
+from rotorjax.ode.outcome import flat_value, traceable
+from rotorjax.ode.structure import require_like
+
+Output = Callable[[Array, PyTree, PyTree, PyTree], PyTree]
+
+
+class _Joint(eqx.Module):
+    """(x, chosen u) ↦ (rhs, output) between flat vectors: one Jacobian holds A, B, C and D."""
+
+    rhs: Callable
+    output: Output
+    of_state: Callable = eqx.field(static=True)
+    of_input: Callable = eqx.field(static=True)
+    chosen: tuple[int, ...] = eqx.field(static=True)
+
+    def __call__(self, z: Float[Array, " n+m"], t: Array, inputs: Float[Array, " M"], p: PyTree) -> Array:
+        n = z.size - len(self.chosen)
+        x = self.of_state(z[:n])
+        u = self.of_input(inputs.at[jnp.array(self.chosen, int)].set(z[n:].astype(inputs.dtype)))
+        parts = (ravel_pytree(self.rhs(t, x, u, p))[0], ravel_pytree(self.output(t, x, u, p))[0])
+        return jnp.concatenate([part.astype(z.dtype) for part in parts])
+
+
+def linearise(
+    rhs: Callable[[Array, PyTree, PyTree, PyTree], PyTree],
+    output: Output,
+    orbit: Orbit,
+    u: PyTree,
+    p: PyTree = None,
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+    nodes: int | None = None,
+    chunk: int = CHUNK,
+    progress: bool = False,
+) -> PeriodicModel:
+    """Linearise x' = rhs(t, x, u, p), y = output(t, x, u, p) about an orbit, at equally spaced times of the period.
+
+    u: constant inputs, pytree of floating-point arrays. inputs, outputs: names to keep (`collective`, `inflow[2]`, or
+    a group without index), all by default; they come from the pytrees' own keys. units: by name or group, kept with
+    the model. nodes: number of times, the orbit's own by default, otherwise by trigonometric interpolation of the
+    orbit. chunk: columns a pass: memory is that of `chunk` evaluations beside the result, K (n + q)(n + m) numbers.
+
+    Raises InputError where the orbit has not converged, a name is unknown, or rhs returns another structure than the
+    state's.
+    """
+    require_converged(orbit)
+    times = orbit.t if nodes is None else orbit.t[0] + orbit.period * jnp.arange(nodes) / nodes
+    states = orbit.x if nodes is None else orbit.at(times)
+    start = jax.tree.map(lambda leaf: leaf[0], states)
+    u, p = traceable((u, p))
+    require_like(eqx.filter_eval_shape(rhs, times[0], start, u, p), start, "rhs(t, x, u, p)")
+    x_names, u_names = labels(start, "x"), labels(u, "u")
+    y_names = labels(eqx.filter_eval_shape(output, times[0], start, u, p), "y")
+    chosen, kept = select(u_names, inputs, "inputs"), select(y_names, outputs, "outputs")
+    flat_u, of_input = ravel_pytree(u)
+    of_state = ravel_pytree(start)[1]
+    joint = _Joint(rhs, output, of_state, of_input, tuple(map(int, chosen)))
+    flat_x = jax.vmap(lambda x: ravel_pytree(x)[0])(states)
+    n, values, matrices = len(x_names), [], []
+    for k in tqdm(range(times.size), desc="linearise", disable=not progress):
+        z = jnp.concatenate([flat_x[k], flat_u[chosen].astype(flat_x.dtype)])
+        args: tuple[Any, ...] = (times[k], flat_u, p)
+        rows = np.concatenate([np.arange(n), n + kept])
+        matrices.append(dense_jacobian(joint, z, *args, chunk=chunk, progress=progress)[rows])
+        values.append(np.asarray(flat_value(joint, _identity, z, args))[n:][kept])
+    whole = np.stack(matrices)
+    names, outs = tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept)
+    return PeriodicModel(
+        t=np.asarray(times),
+        period=float(orbit.period),
+        a=whole[:, :n, :n],
+        b=whole[:, :n, n:],
+        c=whole[:, n:, :n],
+        d=whole[:, n:, n:],
+        states=x_names,
+        inputs=names,
+        outputs=outs,
+        state_units=units_of(x_names, units),
+        input_units=units_of(names, units),
+        output_units=units_of(outs, units),
+        x=np.asarray(flat_x),
+        u=np.asarray(flat_u)[chosen],
+        y=np.stack(values),
+    )
+
+
+def _identity(x: Array) -> Array:
+    return x

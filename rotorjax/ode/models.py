@@ -1,0 +1,98 @@
+"""Linear state-space models with names and units: periodic in time, and time-invariant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Complex, Float
+
+from rotorjax.errors import InputError
+
+
+@dataclass(frozen=True)
+class PeriodicModel:
+    """dx/dt = A(t) x + B(t) u, y = C(t) x + D(t) u about a periodic orbit, at K equally spaced times of one period.
+
+    t: (K,). period: time. a (K, n, n), b (K, n, m), c (K, q, n), d (K, q, m). states, inputs, outputs: names, with
+    units in state_units, input_units, output_units. x (K, n), u (m,), y (K, q): what the model's deviations are
+    counted from.
+    """
+
+    t: Float[np.ndarray, " K"]
+    period: float
+    a: Float[np.ndarray, "K n n"]
+    b: Float[np.ndarray, "K n m"]
+    c: Float[np.ndarray, "K q n"]
+    d: Float[np.ndarray, "K q m"]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    state_units: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    x: Float[np.ndarray, "K n"]
+    u: Float[np.ndarray, " m"]
+    y: Float[np.ndarray, "K q"]
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return self.a.shape[-1]
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """dx/dt = A x + B u, y = C x + D u.
+
+    a (n, n), b (n, m), c (q, n), d (q, m). states, inputs, outputs: names, with units in input_units, output_units.
+
+    Raises InputError where shapes or names do not fit together.
+    """
+
+    a: Float[np.ndarray, "n n"]
+    b: Float[np.ndarray, "n m"]
+    c: Float[np.ndarray, "q n"]
+    d: Float[np.ndarray, "q m"]
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Check that matrices and names fit together."""
+        n, m, q = len(self.states), len(self.inputs), len(self.outputs)
+        for name, shape in {"a": (n, n), "b": (n, m), "c": (q, n), "d": (q, m)}.items():
+            if getattr(self, name).shape != shape:
+                raise InputError(f"Argument `{name}` must have shape {shape}, but has {getattr(self, name).shape}")
+        if len(self.input_units) != m or len(self.output_units) != q:
+            raise InputError(f"Arguments must give one unit a name, but {m} inputs and {q} outputs have other numbers")
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return self.a.shape[0]
+
+    def poles(self) -> Complex[np.ndarray, " n"]:
+        """Eigenvalues of A, the slowest first."""
+        values = np.linalg.eigvals(self.a)
+        return values[np.argsort(np.abs(values))]
+
+    def response(self, frequencies: Float[np.ndarray, " W"]) -> Complex[np.ndarray, "W q m"]:
+        """Transfer matrix C (iω − A)⁻¹ B + D at angular frequencies ω (rad per unit of time)."""
+        eye = np.eye(self.order)
+        return np.array([self.c @ np.linalg.solve(1j * w * eye - self.a, self.b) + self.d for w in frequencies])
+
+    def step(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N q m"]:
+        """Outputs at equally spaced times from 0 after a unit step of each input at time 0, exact at those times."""
+        n, m = self.b.shape
+        dt = times[1] - times[0]
+        if abs(times[0]) > 1e-12 * abs(dt) or not np.allclose(np.diff(times), dt, rtol=1e-9):
+            raise InputError("Argument `times` must start at 0 and be equally spaced")
+        joint = np.block([[self.a, self.b], [np.zeros((m, n + m))]])
+        leap = scipy.linalg.expm(joint * dt)
+        x, out = np.zeros((n, m)), []
+        for _ in times:
+            out.append(self.c @ x + self.d)
+            x = leap[:n, :n] @ x + leap[:n, n:]
+        return np.array(out)
