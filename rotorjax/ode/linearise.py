@@ -75,14 +75,14 @@ def linearise(
     of_state = ravel_pytree(start)[1]
     joint = _Joint(rhs, output, of_state, of_input, tuple(map(int, chosen)))
     flat_x = jax.vmap(lambda x: ravel_pytree(x)[0])(states)
-    n, values, matrices = len(x_names), [], []
+    n, rows = len(x_names), np.concatenate([np.arange(len(x_names)), len(x_names) + kept])
+    whole = np.empty((times.size, rows.size, n + chosen.size), flat_x.dtype)
+    values = np.empty((times.size, kept.size), flat_x.dtype)
     for k in tqdm(range(times.size), desc="linearise", disable=not progress):
         z = jnp.concatenate([flat_x[k], flat_u[chosen].astype(flat_x.dtype)])
         args: tuple[Any, ...] = (times[k], flat_u, p)
-        rows = np.concatenate([np.arange(n), n + kept])
-        matrices.append(dense_jacobian(joint, z, *args, chunk=chunk, progress=progress)[rows])
-        values.append(np.asarray(flat_value(joint, _identity, z, args))[n:][kept])
-    whole = np.stack(matrices)
+        whole[k] = dense_jacobian(joint, z, *args, chunk=chunk, progress=progress)[rows]
+        values[k] = np.asarray(flat_value(joint, _identity, z, args))[n:][kept]
     names, outs = tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept)
     return PeriodicModel(
         t=np.asarray(times),
@@ -99,7 +99,7 @@ def linearise(
         output_units=units_of(outs, units),
         x=np.asarray(flat_x),
         u=np.asarray(flat_u)[chosen],
-        y=np.stack(values),
+        y=values,
     )
 
 

@@ -39,6 +39,31 @@ class PeriodicModel:
         """Number of states."""
         return self.a.shape[-1]
 
+    def step(self, u: Float[np.ndarray, " m"], periods: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Times (N,) and output deviations (N, q) after the inputs step by u at t[0], over a number of periods.
+
+        Classical Runge-Kutta over two of the model's intervals a step, which takes A and B at its times only: order 4
+        in period/K. Outputs are at every second time.
+
+        Raises InputError where the number of times is odd, or too small to hold the fastest mode (unstable march).
+        """
+        if self.t.size % 2:
+            raise InputError(f"Argument `t` must hold an even number of times for a march, but holds {self.t.size}")
+        dt, nodes = 2 * self.period / self.t.size, self.t.size
+        x, times, outputs = np.zeros(self.order), [], []
+        for k in range(round(periods * nodes / 2) + 1):
+            first, middle, last = 2 * k % nodes, (2 * k + 1) % nodes, (2 * k + 2) % nodes
+            times.append(self.t[0] + k * dt)
+            outputs.append(self.c[first] @ x + self.d[first] @ u)
+            k1 = self.a[first] @ x + self.b[first] @ u
+            k2 = self.a[middle] @ (x + dt / 2 * k1) + self.b[middle] @ u
+            k3 = self.a[middle] @ (x + dt / 2 * k2) + self.b[middle] @ u
+            k4 = self.a[last] @ (x + dt * k3) + self.b[last] @ u
+            x = x + dt / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            if not np.all(np.isfinite(x)):
+                raise InputError(f"Argument `t` must hold more times: the march at {nodes} a period is not stable")
+        return np.array(times), np.array(outputs)
+
 
 @dataclass(frozen=True)
 class LinearModel:

@@ -10,8 +10,10 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float, PyTree
+from tqdm import tqdm
 
 from rotorjax.errors import InputError
+from rotorjax.ode.outcome import traceable
 from rotorjax.ode.runge_kutta import RK5, ButcherTableau, Rhs, step
 
 Scan = Callable[..., tuple[PyTree, PyTree]]
@@ -20,11 +22,13 @@ Scan = Callable[..., tuple[PyTree, PyTree]]
 class Trajectory(eqx.Module):
     """States along a march, the start included.
 
-    t: times (S + 1,). x: states, every leaf with a leading axis of S + 1.
+    t: times (S + 1,). x: states, every leaf with a leading axis of S + 1. why: how a watched march ended.
     """
 
     t: Float[Array, " S+1"]
     x: PyTree
+    finished: bool = eqx.field(static=True, default=True)
+    why: str = eqx.field(static=True, default="")
 
     @property
     def last(self) -> PyTree:
@@ -60,6 +64,14 @@ def checkpointed_scan(f: Callable, init: PyTree, xs: PyTree = None, length: int 
     return last, jax.tree.map(lambda v: v.reshape(length, *v.shape[2:]), ys)
 
 
+def _require_steps(steps: int, save_every: int) -> None:
+    if save_every < 1 or steps < 1 or steps % save_every:
+        raise InputError(
+            f"Argument `steps` must be a positive multiple of `save_every` = {save_every}, but is {steps}: "
+            f"try {max(1, round(steps / max(save_every, 1))) * max(save_every, 1)}"
+        )
+
+
 def integrate(
     rhs: Rhs,
     x0: PyTree,
@@ -79,11 +91,7 @@ def integrate(
     Raises InputError where `steps` is not a positive multiple of `save_every`, or `rhs` returns another shape than the
     state's.
     """
-    if save_every < 1 or steps < 1 or steps % save_every:
-        raise InputError(
-            f"Argument `steps` must be a positive multiple of `save_every` = {save_every}, but is {steps}: "
-            f"try {max(1, round(steps / max(save_every, 1))) * max(save_every, 1)}"
-        )
+    _require_steps(steps, save_every)
     x0 = jax.tree.map(jnp.asarray, x0)
     time = jnp.result_type(t0, dt, float)
     t0, dt = jnp.asarray(t0, time), jnp.asarray(dt, time)
@@ -114,3 +122,49 @@ def integrate_checkpointed(
 ) -> Trajectory:
     """`integrate`, with a reverse pass that keeps about √steps states and computes the others again."""
     return integrate(rhs, x0, t0, dt, steps, *args, save_every=save_every, tableau=tableau, scan=checkpointed_scan)
+
+
+@eqx.filter_jit
+def _stretch(
+    rhs: Rhs, x: PyTree, first: Array, t0: Array, dt: Array, steps: int, args: tuple, tableau: ButcherTableau
+) -> PyTree:
+    def one(x: PyTree, i: Array) -> tuple[PyTree, None]:
+        return step(rhs, t0 + (first + i).astype(t0.dtype) * dt, x, dt, *args, tableau=tableau), None
+
+    return jax.lax.scan(one, x, jnp.arange(steps))[0]
+
+
+def march(
+    rhs: Rhs,
+    x0: PyTree,
+    t0: ArrayLike,
+    dt: ArrayLike,
+    steps: int,
+    *args: Any,
+    save_every: int = 1,
+    tableau: ButcherTableau = RK5,
+    progress: bool = True,
+) -> Trajectory:
+    """`integrate` watched from the host: a progress bar, and an early end that keeps what there is.
+
+    Ends with `finished` False and a reason in `why` where the state is no longer finite (the last finite states are
+    kept) or at a keyboard interrupt. Not differentiable: use `integrate` for that.
+
+    Raises InputError as `integrate` does.
+    """
+    _require_steps(steps, save_every)
+    time = jnp.result_type(t0, dt, float)
+    start, interval, args = jnp.asarray(t0, time), jnp.asarray(dt, time), traceable(args)
+    x = jax.tree.map(jnp.asarray, x0)
+    states, why = [x], ""
+    try:
+        for first in tqdm(range(0, steps, save_every), desc="march", disable=not progress):
+            x = _stretch(rhs, x, jnp.asarray(first), start, interval, save_every, args, tableau)
+            if not all(bool(jnp.all(jnp.isfinite(leaf))) for leaf in jax.tree.leaves(x)):
+                why = f"not finite between steps {first} and {first + save_every}: the last finite states are kept"
+                break
+            states.append(x)
+    except KeyboardInterrupt:
+        why = f"interrupted after step {(len(states) - 1) * save_every}"
+    t = start + interval * save_every * jnp.arange(len(states), dtype=time)
+    return Trajectory(t, jax.tree.map(lambda *leaves: jnp.stack(leaves), *states), not why, why or "finished")

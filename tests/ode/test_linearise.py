@@ -1,4 +1,3 @@
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -7,7 +6,6 @@ from systems import van_der_pol
 from rotorjax.errors import InputError
 from rotorjax.ode.collocation import collocate
 from rotorjax.ode.linearise import linearise
-from rotorjax.ode.runge_kutta import RK4, step
 from rotorjax.ode.trajectory import integrate
 
 U = {"force": jnp.array([1.5, 1.1]), "bias": jnp.array(0.0)}
@@ -72,24 +70,25 @@ def test_fewer_times(orbit):
 
 def test_linear_march_follows_the_nonlinear_one(orbit):
     """A small step of the bias: the periodic linear model's march against the nonlinear one."""
-    small, steps = 1e-4, 122
+    small, steps = 1e-4, 120
     model = linearise(rhs, output, orbit, U, 0.5, inputs=["bias"], nodes=2 * steps)
     stepped = {**U, "bias": jnp.array(small)}
-    nonlinear = integrate(rhs, orbit.start, 0.0, PERIOD / steps, steps, stepped, 0.5).x["position"]
-    calm = integrate(rhs, orbit.start, 0.0, PERIOD / steps, steps, U, 0.5).x["position"]
-    a, b = jnp.array(model.a), jnp.array(model.b[:, :, 0])
+    runs = [integrate(rhs, orbit.start, 0.0, PERIOD / steps, 2 * steps, u, 0.5).x for u in (stepped, U)]
+    energies = [0.5 * (x["position"] ** 2 + x["rate"] ** 2) for x in runs]
+    times, linear = model.step(np.array([small]), periods=2)
+    assert times[-1] == pytest.approx(2 * PERIOD)
+    response = np.array(energies[0] - energies[1]) + small
+    assert np.abs(linear[:, 0] - response).max() < 1e-3 * np.abs(response).max()
 
-    def march(x, k):
-        # RK4 sees the ends and the middle of a step: every second of the model's times.
-        def rate(t, x):
-            n = jnp.round(2 * steps * t / PERIOD).astype(int) % (2 * steps)
-            return a[n] @ x + b[n] * small
 
-        return step(rate, k * PERIOD / steps, x, PERIOD / steps, tableau=RK4), x[0]
-
-    _, linear = jax.lax.scan(march, jnp.zeros(2), jnp.arange(steps))
-    response = nonlinear[:-1] - calm[:-1]
-    assert float(jnp.abs(linear - response).max() / jnp.abs(response).max()) < 1e-3
+def test_linear_march_is_of_fourth_order(orbit):
+    sizes = np.array([120, 170, 240, 340])
+    ends = [
+        linearise(rhs, output, orbit, U, 0.5, inputs=["bias"], nodes=int(n)).step(np.ones(1))[1][-1, 0]
+        for n in [*sizes, 1600]
+    ]
+    errors = np.abs(np.array(ends[:-1]) - ends[-1])
+    assert abs(-np.polyfit(np.log(sizes), np.log(errors), 1)[0] - 4) < 0.2
 
 
 def test_bad_input(orbit):
@@ -102,3 +101,5 @@ def test_bad_input(orbit):
     lost = collocate(rhs, circle(21), PERIOD, U, 0.5, max_iterations=1)
     with pytest.raises(InputError, match="must have converged"):
         linearise(rhs, output, lost, U, 0.5)
+    with pytest.raises(InputError, match="even number"):
+        linearise(rhs, output, orbit, U, 0.5).step(np.zeros(3))

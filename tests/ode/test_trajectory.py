@@ -8,7 +8,7 @@ import scipy.integrate
 
 from rotorjax.errors import InputError
 from rotorjax.ode.runge_kutta import RK4, RK5
-from rotorjax.ode.trajectory import checkpointed_scan, integrate, integrate_checkpointed
+from rotorjax.ode.trajectory import checkpointed_scan, integrate, integrate_checkpointed, march
 
 
 def rotor_free(t, x, p):
@@ -20,8 +20,8 @@ def rotor_free(t, x, p):
 START = (jnp.array(0.5), jnp.array(-0.3))
 
 
-def final(p, steps=64, march=integrate):
-    return march(rotor_free, START, 0.0, 4.0 / steps, steps, p, save_every=steps).last[0]
+def final(p, steps=64, run=integrate):
+    return run(rotor_free, START, 0.0, 4.0 / steps, steps, p, save_every=steps).last[0]
 
 
 @pytest.mark.parametrize(("tableau", "order"), [(RK4, 4), (RK5, 5)])
@@ -48,11 +48,11 @@ def test_saved_states_are_those_of_the_full_march():
 
 @pytest.mark.parametrize("save_every", [1, 6, 60])
 def test_checkpointed_equals_plain(save_every):
-    def run(march, p):
-        x = march(rotor_free, START, 0.0, 0.05, 60, p, save_every=save_every).x
+    def run(way, p):
+        x = way(rotor_free, START, 0.0, 0.05, 60, p, save_every=save_every).x
         return jnp.sum(jnp.sin(x[0]) * x[1])
 
-    plain, kept = (jax.jit(jax.value_and_grad(partial(run, march))) for march in (integrate, integrate_checkpointed))
+    plain, kept = (jax.jit(jax.value_and_grad(partial(run, way))) for way in (integrate, integrate_checkpointed))
     np.testing.assert_allclose(kept(2.0), plain(2.0), rtol=1e-13)
 
 
@@ -89,3 +89,36 @@ def test_bad_input():
         integrate(rotor_free, START, 0.0, 0.1, 10, 2.0, save_every=4)
     with pytest.raises(InputError, match="structure"):
         integrate(lambda t, x: jnp.zeros(2), START, 0.0, 0.1, 10)
+
+
+def test_watched_march_is_integrate():
+    watched = march(rotor_free, START, 1.0, 0.05, 60, 2.0, save_every=15, progress=False)
+    plain = integrate(rotor_free, START, 1.0, 0.05, 60, 2.0, save_every=15)
+    assert watched.finished
+    np.testing.assert_allclose(watched.t, plain.t, rtol=1e-15)
+    np.testing.assert_allclose(watched.x[0], plain.x[0], rtol=1e-13)
+
+
+def test_a_march_that_runs_away_keeps_what_it_had():
+    """x' = x² from 1 is infinite at t = 1."""
+    run = march(lambda t, x: x**2, jnp.array(1.0), 0.0, 0.05, 200, save_every=10, progress=False)
+    assert not run.finished
+    assert "not finite between steps" in run.why
+    assert bool(jnp.isfinite(run.x).all())
+    assert run.t.size == run.x.size >= 2
+
+
+def test_an_interrupted_march_keeps_what_it_had(monkeypatch):
+    calls, real = [], jnp.isfinite
+
+    def isfinite(x):
+        calls.append(1)
+        if len(calls) > 20:
+            raise KeyboardInterrupt
+        return real(x)
+
+    monkeypatch.setattr(jnp, "isfinite", isfinite)
+    run = march(lambda t, x: -x, jnp.array(1.0), 0.0, 0.1, 50, progress=False)
+    assert not run.finished
+    assert run.why == "interrupted after step 20"
+    assert run.t.size == 21
