@@ -10,7 +10,6 @@ holds only with the adjoint terms at ψ + π; this form needs no such turn. It i
 v_B = 0 for pressure modes (tests/potential/test_field.py integrates along streamlines).
 """
 
-from collections.abc import Callable
 from math import factorial, log, pi, sqrt
 
 import jax
@@ -49,9 +48,16 @@ def pressure_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[
     return _by_mode(modes, _radial(modes.pairs, at), at)
 
 
-def disk_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
-    """Return Φ of the disk plane's upper face at the streamline's foot (x, y, 0): P̄ {cos, sin} mψ on the disk."""
-    return pressure_functions(modes, points * jnp.array([1, 1, 0], points.dtype))
+def disk_functions(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "M ..."]:
+    """Return P̄_n^m {cos, sin} mψ on the disk's upper face at hub-frame stations (x, y), zero outside the disk.
+
+    Outside that is Φ of pressure modes in the plane of the disk too, but not of mass sources.
+    """
+    inside = x * x + y * y < 1
+    x, y = jnp.where(inside, x, 0.0), jnp.where(inside, y, 0.0)
+    nu = jnp.sqrt(1 - x * x - y * y)
+    on_disk = Ellipsoidal(nu, jnp.zeros_like(nu), x, y)
+    return jnp.where(inside, _by_mode(modes, legendre_p(modes.pairs, nu), on_disk), 0.0)
 
 
 def sigma(m: int, n: int) -> float:
@@ -103,18 +109,17 @@ def velocity_potentials(
     return _by_mode(modes, jnp.stack(rows), at)
 
 
-def _along(function: Callable[[Array], Array], points: Float[Array, "*N 3"], axis: int) -> Array:
-    """∂/∂x or ∂/∂y of a function of points, each value depending on its own point."""
-    return jax.jvp(function, (points,), (jnp.zeros_like(points).at[..., axis].set(1),))[1]
-
-
 def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
     """Return the velocity (hub frame) of each mode's unit state on and above the disk: ∇Ψ, the axial one being −Φ."""
 
     def potentials(p: Array) -> Array:
         return velocity_potentials(modes, p)
 
-    return jnp.stack([_along(potentials, points, 0), _along(potentials, points, 1), -pressure_functions(modes, points)])
+    axes = jnp.broadcast_to(
+        jnp.eye(3, dtype=points.dtype)[:2].reshape(2, *(1,) * (points.ndim - 1), 3), (2, *points.shape)
+    )
+    in_plane = jax.vmap(lambda axis: jax.jvp(potentials, (points,), (axis,))[1])(axes)  # each value has its own point
+    return jnp.concatenate([in_plane, -pressure_functions(modes, points)[None]])
 
 
 def _mirrored(points: Float[Array, "*N 3"]) -> Float[Array, "*N 3"]:
@@ -127,7 +132,7 @@ def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Arr
     above = pressure_functions(modes, _mirrored(points))
     if modes.parity == "even":
         return above
-    return jnp.where(points[..., 2] >= 0, above, 2 * disk_functions(modes, points) - above)
+    return jnp.where(points[..., 2] >= 0, above, 2 * disk_functions(modes, points[..., 0], points[..., 1]) - above)
 
 
 def field_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:

@@ -91,7 +91,7 @@ def ground_on_rotor(
 
 def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "G ..."]:
     """Return the normal velocity of unit ground states on the ground disk itself."""
-    return disk_functions(modes, jnp.stack([x, y, jnp.zeros_like(x)], axis=-1))
+    return disk_functions(modes, x, y)
 
 
 def correlation(rotor: ModeTable, sources: ModeTable, ground: Plane, quadrature: DiskQuadrature) -> Float[Array, "G M"]:

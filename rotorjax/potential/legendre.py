@@ -15,6 +15,7 @@ The factor e^{n+1} is put in last: it would underflow in float32.
 """
 
 from functools import cache, partial
+from itertools import zip_longest
 from math import factorial, pi, prod, sqrt
 
 import jax
@@ -96,18 +97,15 @@ def _series(m: int, n: int) -> tuple[float, ...]:
     return tuple(c / total for c in coefficients)
 
 
-def _horner(coefficients: tuple[float, ...], u: Float[Array, "*N"]) -> Float[Array, "*N"]:
-    result = jnp.full_like(u, coefficients[-1])
-    for c in coefficients[-2::-1]:
-        result = result * u + c
-    return result
-
-
 def _start(top: int, e: Float[Array, "*N"]) -> Float[Array, "2 2 *N"]:
-    """Q̄_n^m/e^{n+1} for n = top, top + 1 (first axis) and m = 0, 1."""
-    e2 = e * e
-    u, scale = e2 / (1 + e2), jnp.sqrt(2 / (1 + e2))
-    return jnp.stack([jnp.stack([scale * _horner(_series(m, n), u) for m in (0, 1)]) for n in (top, top + 1)])
+    """Q̄_n^m/e^{n+1} for n = top, top + 1 (first axis) and m = 0, 1, by Horner's rule."""
+    rows = list(zip_longest(*(_series(m, n) for n in (top, top + 1) for m in (0, 1)), fillvalue=0.0))
+    coefficients = jnp.asarray(rows, e.dtype).reshape(len(rows), 2, 2, *(1,) * e.ndim)
+    u = e * e / (1 + e * e)
+    total = coefficients[-1]
+    for c in coefficients[-2::-1]:
+        total = total * u + c
+    return total * jnp.sqrt(2 / (1 + e * e))
 
 
 def _downward(top: int, lowest: int, eta: Float[Array, "*N"], e: Float[Array, "*N"]) -> Float[Array, "D 2 *N"]:

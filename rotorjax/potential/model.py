@@ -16,9 +16,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.frames import disk_points
 from rotorjax.ground import Plane
-from rotorjax.potential.field import field_functions, pressure_functions
+from rotorjax.potential.field import disk_functions, field_functions
 from rotorjax.potential.ground_source import (
     Correction,
     DiskQuadrature,
@@ -66,22 +65,26 @@ def finite_state_model(
     b: float = float(np.pi / 7),
     p: float = 2.0,
     mass_flow: MassFlow = "paper",
+    ground_parity: Literal["even", "odd"] = "even",
     quadrature: DiskQuadrature | None = None,
 ) -> FiniteStateModel:
     """Make the model; its defaults are the paper's for level ground (τ₁, τ₃, τ₅; b^{η^p} with π/7 and 2).
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
-    terms of each harmonic. Raises InputError where a count, b, p or mass_flow is not allowed.
+    terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only). Raises
+    InputError where a count, b, p, mass_flow or ground_parity is not allowed.
     """
     if mass_flow not in get_args(MassFlow):
         raise InputError(f"Argument `mass_flow` must be one of {get_args(MassFlow)}, but is {mass_flow!r}")
+    if ground_parity not in ("even", "odd"):
+        raise InputError(f"Argument `ground_parity` must be 'even' or 'odd', but is {ground_parity!r}")
     quadrature = quadrature or DiskQuadrature()
     least = 2 * max(harmonics, ground_harmonics) + 1
     if quadrature.nodes_psi < least:
         raise InputError(f"Argument `quadrature` must have at least {least} nodes in ψ, but has {quadrature.nodes_psi}")
     return FiniteStateModel(
         rotor_modes(harmonics, radial_terms),
-        ground_modes(ground_harmonics, ground_radial_terms),
+        ground_modes(ground_harmonics, ground_radial_terms, ground_parity),
         ground,
         correction(b, p),
         quadrature,
@@ -98,6 +101,7 @@ def mass_flow_parameters(model: FiniteStateModel, tau: Float[Array, " M"]) -> Fl
     return jnp.where(first, v, 2 * v)
 
 
+@eqx.filter_jit
 def steady_state(model: FiniteStateModel, tau: Float[Array, " M"]) -> FiniteState:
     """Return the states of a steady loading in hover, a = V̂⁻¹τ (Eq. 3) and c = G a (Eq. 36).
 
@@ -113,14 +117,18 @@ def steady_state(model: FiniteStateModel, tau: Float[Array, " M"]) -> FiniteStat
     return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
 
 
-def axial_velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N"]:
-    """Return the downward velocity on and above the disk at hub-frame points, the ground's included (over ΩR)."""
-    down = jnp.tensordot(state.a, pressure_functions(model.modes, points), 1)
+def disk_inflow(
+    state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel
+) -> Float[Array, "*N"]:
+    """Return λ over ΩR, positive down, at hub-frame stations (x, y) of the disk, over R, with the ground's effect."""
+    down = jnp.tensordot(state.a, disk_functions(model.modes, x, y), 1)
     if model.ground is None:
         return down
+    points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
     return down - jnp.tensordot(state.c, ground_on_rotor(model.sources, model.ground, model.correction, points), 1)
 
 
+@eqx.filter_jit
 def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N 3"]:
     """Return the induced velocity at hub-frame points over R, in the hub frame over ΩR.
 
@@ -134,20 +142,22 @@ def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStat
     return jnp.moveaxis(rotor, 0, -1)
 
 
+@eqx.filter_jit
 def inflow(
     state: FiniteState, r: Float[Array, " R"], psi: Float[Array, " K"], model: FiniteStateModel
 ) -> Float[Array, "K R"]:
     """Return λ over ΩR, positive down, at radii r (over R) and azimuths psi (rad), the ground's effect included."""
-    return axial_velocity(state, disk_points(r[None, :], psi[:, None]), model)
+    return disk_inflow(state, r[None, :] * jnp.cos(psi)[:, None], r[None, :] * jnp.sin(psi)[:, None], model)
 
 
+@eqx.filter_jit
 def mean_inflow(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
     """Return the area-weighted mean of λ over the whole disk, over ΩR."""
     x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
-    points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
-    return (2 * nu * weights) @ axial_velocity(state, points, model)  # r dr = −ν dν
+    return (2 * nu * weights) @ disk_inflow(state, x, y, model)  # r dr = −ν dν
 
 
+@eqx.filter_jit
 def ground_normal_velocity_rms(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
     """Return the rms of the normal velocity left on the plane over that of the flow into it, inside the wake radius.
 

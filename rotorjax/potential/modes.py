@@ -117,6 +117,11 @@ def rotor_modes(harmonics: int = 0, radial_terms: int = 3) -> ModeTable:
     return mode_table(1, harmonics, radial_terms)
 
 
-def ground_modes(harmonics: int = 0, radial_terms: int = 5) -> ModeTable:
-    """Make the ground's table, j = r, r+2, … (Eq. 8), the r = j terms of Appendix E included."""
-    return mode_table(0, harmonics, radial_terms)
+def ground_modes(harmonics: int = 0, radial_terms: int = 5, parity: Literal["even", "odd"] = "even") -> ModeTable:
+    """Make the ground's table.
+
+    parity "even" is the paper's j = r, r+2, … (Eq. 8), the r = j terms of Appendix E included; their flow crosses
+    the plane outside the ground disk, which the correction factor makes up for. "odd" is j = r+1, r+3, … (after Eq.
+    41): the functions of a source disk, which close the plane outside the disk too and need no factor.
+    """
+    return mode_table(0 if parity == "even" else 1, harmonics, radial_terms)

@@ -1,0 +1,188 @@
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane, plane
+from rotorjax.potential import loading
+from rotorjax.potential.model import (
+    FiniteState,
+    finite_state_model,
+    ground_normal_velocity_rms,
+    inflow,
+    mass_flow_parameters,
+    mean_inflow,
+    steady_state,
+    velocity,
+)
+
+CT = 0.006
+ONE_TERM = jnp.array([np.sqrt(3) / 4 * CT])
+THREE_TERMS = jnp.array([np.sqrt(3) / 4 * CT, 5e-4, 2e-4])
+R, PSI = jnp.array([0.3, 0.6, 0.9]), jnp.array([0.0, np.pi / 2, np.pi])
+
+
+def ratio(height, **settings):
+    model = finite_state_model(plane(height), radial_terms=1, **settings)
+    return float(mean_inflow(steady_state(model, ONE_TERM), model) / np.sqrt(CT / 2))
+
+
+def test_one_term_gives_momentum_theory():
+    model = finite_state_model(radial_terms=1)
+    np.testing.assert_allclose(mean_inflow(steady_state(model, ONE_TERM), model), np.sqrt(CT / 2), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("height", "paper", "no_factor"),
+    [
+        (0.5, 0.302, 0.107),
+        (0.75, 0.525, 0.222),
+        (1, 0.699, 0.323),
+        (1.5, 0.895, 0.474),
+        (2, 0.963, 0.577),
+        (3, 0.991, 0.700),
+    ],
+)
+def test_mean_inflow_ratio_of_the_printed_equations(height, paper, no_factor):
+    """Computed independently with mpmath and the trapezoidal rule, j = 0, 2, 4; rounded to three digits."""
+    assert abs(ratio(height, ground_radial_terms=3) - paper) < 6e-4
+    assert abs(ratio(height, ground_radial_terms=3, b=1.0) - no_factor) < 6e-4
+
+
+@pytest.mark.parametrize(
+    ("height", "without"), [(0.5, 0.822), (0.75, 0.875), (1, 0.913), (1.5, 0.955), (2, 0.975), (3, 0.991)]
+)
+def test_mean_inflow_ratio_without_the_diagonal_terms(height, without):
+    model = finite_state_model(plane(height), radial_terms=1, ground_radial_terms=3)
+    state = steady_state(model, ONE_TERM)
+    state = eqx.tree_at(lambda s: s.c, state, jnp.where(model.sources.diagonal, 0.0, state.c))
+    assert abs(float(mean_inflow(state, model) / np.sqrt(CT / 2)) - without) < 6e-4
+    assert ground_normal_velocity_rms(state, model) > 0.5
+
+
+@pytest.mark.parametrize(
+    ("height", "slope"), [(0.5, 0), (1, 0), (3, 0), (1, 15), (1, 30), (1, 40), (0.9, 30), (1.5, 30)]
+)
+def test_ground_condition_holds_to_three_percent(height, slope):
+    model = finite_state_model(plane(height, slope), ground_harmonics=1)
+    assert 1e-4 < ground_normal_velocity_rms(steady_state(model, ONE_TERM_OF_THREE), model) < 0.03
+
+
+ONE_TERM_OF_THREE = jnp.array([np.sqrt(3) / 4 * CT, 0, 0])
+
+
+def test_more_source_terms_leave_less():
+    left = []
+    for terms in (2, 4, 7):
+        model = finite_state_model(plane(1.0), ground_radial_terms=terms)
+        left.append(ground_normal_velocity_rms(steady_state(model, THREE_TERMS), model))
+    assert left[0] > 1.5 * left[1] > 2 * left[2]
+
+
+def test_odd_sources_need_no_factor():
+    """Closing the plane outside the disk too brings the model to the exact image without calibration."""
+    exact = {0.5: 0.3435, 1.0: 0.6086, 2.0: 0.8373, 3.0: 0.9161}
+    for height, value in exact.items():
+        assert abs(ratio(height, ground_parity="odd", ground_radial_terms=4) - value) < 0.05
+
+
+def test_far_ground_is_no_ground():
+    model, free = finite_state_model(plane(30.0)), finite_state_model()
+    state = steady_state(model, THREE_TERMS)
+    np.testing.assert_allclose(inflow(state, R, PSI, model), inflow(state, R, PSI, free), rtol=1e-4)
+
+
+def test_mass_flow_options():
+    paper, linear = finite_state_model(harmonics=1), finite_state_model(harmonics=1, mass_flow="linear")
+    tau = jnp.full(9, 1e-3).at[0].set(THREE_TERMS[0])
+    v = np.sqrt(CT / 2)
+    np.testing.assert_allclose(mass_flow_parameters(paper, tau), v * np.array([1] + [2] * 8), rtol=1e-14)
+    np.testing.assert_allclose(mass_flow_parameters(linear, tau), v, rtol=1e-14)
+
+
+def test_mountain_side_has_less_inflow_and_the_difference_grows():
+    tau, differences = ONE_TERM_OF_THREE, []
+    for slope in (0.0, 5.0, 8.0, 10.0, 15.0, 30.0):
+        model = finite_state_model(plane(1.0, slope), ground_harmonics=1)
+        lam = inflow(steady_state(model, tau), R, jnp.array([0.0, np.pi]), model)
+        differences.append(lam[1] - lam[0])
+    differences = np.array(differences)
+    np.testing.assert_allclose(differences[0], 0, atol=1e-15)
+    assert np.all(np.diff(differences, axis=0) > 0)
+
+
+def test_slope_is_symmetric_about_its_own_plane():
+    model = finite_state_model(plane(1.0, 20.0), ground_harmonics=2)
+    state = steady_state(model, THREE_TERMS)
+    psi = jnp.array([0.4, 1.3, 2.5])
+    np.testing.assert_allclose(inflow(state, R, psi, model), inflow(state, R, -psi, model), rtol=1e-13)
+
+
+def test_velocity_on_the_disk_is_minus_the_inflow_and_continuous_below():
+    model = finite_state_model(plane(1.0, 10.0), harmonics=1, ground_harmonics=1)
+    state = steady_state(model, jnp.full(9, 2e-4).at[0].set(2.6e-3))
+    points = jnp.array([[0.5, 0.2, 0.0], [0.5, 0.2, -1e-9], [0.5, 0.2, 1e-9]])
+    v = velocity(state, points, model)
+    r, psi = jnp.hypot(0.5, 0.2)[None], jnp.arctan2(0.2, 0.5)[None]
+    np.testing.assert_allclose(-v[0, 2], inflow(state, r, psi, model)[0, 0], rtol=1e-13)
+    np.testing.assert_allclose(v[1:], v[:1].repeat(2, axis=0), atol=1e-9)
+
+
+def test_velocity_at_the_ground_sums_to_the_residual():
+    model = finite_state_model(plane(1.0), ground_radial_terms=7)
+    state = steady_state(model, ONE_TERM_OF_THREE)
+    r = jnp.linspace(0.05, 0.9, 9)
+    v = velocity(state, jnp.stack([r, 0 * r, 0 * r - 1.0], axis=-1), model)
+    far = velocity(state, jnp.stack([r, 0 * r, 0 * r - 1.0], axis=-1), finite_state_model())
+    assert np.all(np.abs(v[:, 2]) < 0.04 * np.abs(far[:, 2]))
+
+
+def outcome(v, tau):
+    """Inflow at nine points from (height, slope, b, p) and τ."""
+    model = finite_state_model(plane(1.0), ground_harmonics=1)
+    model = eqx.tree_at(lambda m: (m.ground, m.correction.b, m.correction.p), model, (Plane(v[0], v[1]), v[2], v[3]))
+    return inflow(steady_state(model, tau), R, PSI, model).ravel()
+
+
+def test_derivative_ladder():
+    f, v, step = jax.jit(outcome), jnp.array([1.1, 0.3, 0.4, 1.6]), 1e-5
+    forward = jax.jit(jax.jacfwd(outcome, argnums=(0, 1)))(v, THREE_TERMS)
+    reverse = jax.jit(jax.jacrev(outcome, argnums=(0, 1)))(v, THREE_TERMS)
+    by_v = np.stack([(f(v + step * e, THREE_TERMS) - f(v - step * e, THREE_TERMS)) / (2 * step) for e in np.eye(4)], -1)
+    s = 1e-8
+    by_tau = np.stack([(f(v, THREE_TERMS + s * e) - f(v, THREE_TERMS - s * e)) / (2 * s) for e in np.eye(3)], -1)
+    np.testing.assert_allclose(forward[0], by_v, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(forward[1], by_tau, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(forward[0], reverse[0], rtol=1e-11, atol=1e-14)
+    np.testing.assert_allclose(forward[1], reverse[1], rtol=1e-11, atol=1e-12)
+
+
+def test_a_thousand_grounds_in_one_call():
+    heights, slopes = jnp.meshgrid(jnp.linspace(0.8, 3.0, 40), jnp.linspace(0, 0.6, 25), indexing="ij")
+    v = jnp.stack([heights.ravel(), slopes.ravel(), jnp.full(1000, 0.4), jnp.full(1000, 2.0)], axis=-1)
+    batch = jax.jit(jax.vmap(lambda v: outcome(v, THREE_TERMS)))(v)
+    assert batch.shape == (1000, 9)
+    for i in (0, 517, 999):
+        np.testing.assert_allclose(batch[i], outcome(v[i], THREE_TERMS), rtol=1e-12)
+
+
+def test_no_ground_has_no_sources():
+    model = finite_state_model()
+    state = steady_state(model, THREE_TERMS)
+    assert isinstance(state, FiniteState)
+    assert not np.any(state.c)
+    np.testing.assert_allclose(loading.thrust_coefficient(THREE_TERMS, model.modes), CT, rtol=1e-14)
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(InputError, match="mass_flow"):
+        finite_state_model(mass_flow="twice")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="ground_parity"):
+        finite_state_model(ground_parity="both")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(InputError, match="tau"):
+        steady_state(finite_state_model(), jnp.ones(4))
+    model = finite_state_model()
+    with pytest.raises(InputError, match="ground"):
+        ground_normal_velocity_rms(steady_state(model, THREE_TERMS), model)
