@@ -3,7 +3,12 @@
 The formulas know no units: any consistent ones will do (the wake uses lengths over R and circulation over ΩR²).
 With r₁ and r₂ from a segment's ends to the point, û along it and h the distance from its axis,
 
-    v = (Γ/4π) · W · E · (û × r),    E = û·(r̂₁ − r̂₂),    W = (h²ⁿ + r_c²ⁿ)^(−1/n)      (Vatistas 1991; n = 1 is Scully)
+    v = (Γ/4π) û·(r̂₁ − r̂₂) (û × r₁) / (h²ⁿ + r_c²ⁿ)^(1/n)          (Vatistas et al. 1991; n = 1 is Scully's core)
+
+It is differentiable in forward and in reverse mode with respect to points, nodes, strengths and cores. On a segment's
+axis and its extension the velocity is zero; on a node, where one segment alone has no derivative, its mean over
+directions is taken, which is right for a filament that runs straight on. A segment without a core is singular on its
+axis: the velocity there is zero by convention and has no meaningful derivative.
 """
 
 import jax
@@ -13,6 +18,8 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
+from rotorjax.wake.kernel_rule import BiotSavart
+from rotorjax.wake.kernel_sweeps import Segments, Settings
 
 
 def segment_velocity(
@@ -30,20 +37,18 @@ def segment_velocity(
     """Velocity at points from straight segments with a strength (positive from start to end) and a core radius each.
 
     exponent: Vatistas n ≥ 1 (1 Scully, 2 Bagai–Leishman). plane: add the mirror image in this plane. blades: the
-    segments belong to one blade and repeat by rotation about the shaft. block: points per block.
+    segments belong to one blade and repeat by rotation about the shaft. block: segments per step of the sum.
 
     Raises InputError where shapes do not match, a core is negative or the exponent is below 1.
     """
-    _check(points, strength, core, exponent, blades, {"start": (start, strength.shape), "end": (end, strength.shape)})
-    block = block or 32
-
-    def direct(points):
-        def one(point):
-            return _sum(point, start, end, strength, core, exponent)
-
-        return jax.lax.map(jax.checkpoint(one), points, batch_size=min(block, max(points.shape[0], 1)))
-
-    return _with_copies(direct, points, plane, blades)
+    for name, ends in (("start", start), ("end", end)):
+        if ends.ndim != 2 or ends.shape[1] != 3:
+            raise InputError(f"Argument `{name}` must have shape (S, 3), but is {ends.shape}")
+    if start.shape != end.shape:
+        raise InputError(f"Argument `end` must have the shape of start, {start.shape}, but is {end.shape}")
+    _check_segments(points, strength, core, start.shape[:1])
+    settings = _settings(exponent, blades, block, chained=False)
+    return _velocity(settings, points, start, end, strength, core, plane, blades)
 
 
 def filament_velocity(
@@ -59,22 +64,19 @@ def filament_velocity(
 ) -> Float[Array, "N 3"]:
     """Velocity at points from filaments of straight segments between consecutive nodes; options as segment_velocity.
 
-    Raises InputError where a filament has fewer than two nodes, shapes do not match, or a core is negative.
+    All filaments are strung on one chain, with links of no strength between them, so that the distance of a node
+    serves the segments on both its sides.
+
+    Raises InputError where a filament has fewer than two nodes, shapes do not match, a core is negative or the
+    exponent is below 1.
     """
     if nodes.ndim != 3 or nodes.shape[1] < 2 or nodes.shape[2] != 3:
         raise InputError(f"Argument `nodes` must have shape (F, A, 3) with A >= 2, but is {nodes.shape}")
-    _check(points, strength, core, exponent, blades, {"nodes": (nodes[:, 1:], strength.shape)})
-    return segment_velocity(
-        points,
-        nodes[:, :-1].reshape(-1, 3),
-        nodes[:, 1:].reshape(-1, 3),
-        strength.reshape(-1),
-        core.reshape(-1),
-        exponent=exponent,
-        plane=plane,
-        blades=blades,
-        block=block,
-    )
+    _check_segments(points, strength, core, (nodes.shape[0], nodes.shape[1] - 1))
+    settings = _settings(exponent, blades, block, chained=True)
+    chain = nodes.reshape(-1, 3)
+    strength, core = (jnp.pad(x, ((0, 0), (0, 1))).reshape(-1)[:-1] for x in (strength, core))
+    return _velocity(settings, points, chain[:-1], chain[1:], strength, core, plane, blades)
 
 
 def lattice_velocity(
@@ -89,6 +91,8 @@ def lattice_velocity(
 
     A positive ring runs nodes (r, a) → (r, a+1) → (r+1, a+1) → (r+1, a). Shared edges are summed once: along A row r
     carries Γ[r] − Γ[r−1], across it column a carries Γ[a−1] − Γ[a].
+
+    Raises InputError as filament_velocity, and where rings do not fit the nodes.
     """
     if nodes.ndim != 3 or min(nodes.shape[:2]) < 2 or nodes.shape[2] != 3:
         raise InputError(f"Argument `nodes` must have shape (R, A, 3) with R, A >= 2, but is {nodes.shape}")
@@ -102,59 +106,45 @@ def lattice_velocity(
     )
 
 
-def _sum(point, start, end, strength, core, exponent):
-    """Velocity at one point (3,) from all segments."""
-    r1 = point - start
-    r2 = point - end
-    edge = end - start
-    s1, s2, l2 = (jnp.sum(a * a, -1) for a in (r1, r2, edge))
-    # 1/|r| := 0 on the node itself: the mean over directions, hence what a filament passing straight through has
-    i1, i2, il = (jnp.where(s > 0, 1 / jnp.sqrt(jnp.where(s > 0, s, 1)), 0) for s in (s1, s2, l2))
-    unit = edge * il[:, None]
-    c = jnp.cross(unit, jnp.where((s1 < s2)[:, None], r1, r2))
-    h2 = jnp.sum(c * c, -1)
-    cos = jnp.sum(r1 * r2, -1) * i1 * i2
-    # (1 − cos)/l cancels where the segment is seen under a small angle
-    ahead = cos > 0
-    versine = jnp.where(ahead, h2 * (i1 * i2) ** 2 * l2 * il / jnp.where(ahead, 1 + cos, 1), (1 - cos) * il)
-    e = (s1 * i1 + s2 * i2) * versine
-    return (strength / (4 * jnp.pi) * e * _vatistas(h2, core * core, exponent)) @ c
+def _velocity(settings, points, start, end, strength, core, plane: Plane | None, blades: int):
+    """Sum over the segments, the other blades and the mirror image.
 
-
-def _vatistas(h2, core2, exponent):
-    if exponent == 1:
-        d = h2 + core2
-        return 1 / jnp.where(d > 0, d, 1)
-    top = jnp.maximum(h2, core2)
-    top = jnp.where(top > 0, top, 1)
-    return (1 / top) * ((h2 / top) ** exponent + (core2 / top) ** exponent) ** (-1 / exponent)
-
-
-def _with_copies(direct, points, plane, blades):
-    """Add the other blades and the mirror image: the field at the turned or reflected point, turned or reflected back."""
-    turned = [points]
+    A copy's velocity is the segments' own at the point turned (or reflected) back, turned (or reflected) with the copy.
+    """
+    soft = jnp.sum((end - start) ** 2, axis=1) * core**2
+    segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
     angles = [2 * jnp.pi * b / blades for b in range(blades)]
-    if plane is not None:
-        turned.append(plane.reflect_points(points))
-    everywhere = jnp.stack([rotate_about_shaft(p, -a) for p in turned for a in angles])
-    v = direct(everywhere.reshape(-1, 3)).reshape(len(turned), blades, -1, 3)
-    total = sum(rotate_about_shaft(v[:, b], a) for b, a in enumerate(angles))
-    return total[0] if plane is None else total[0] + plane.reflect_vectors(total[1])
+    sides = [points] if plane is None else [points, plane.reflect_points(points)]
+    places = [rotate_about_shaft(side, jnp.asarray(-a, points.dtype)) for side in sides for a in angles]
+    if not points.shape[0] or not strength.shape[0]:
+        return jnp.zeros_like(points)
+    everywhere = jnp.concatenate(places).T
+    parts = jnp.split(BiotSavart(settings, everywhere, segments)(everywhere, segments).T, len(places))
+    turned = [
+        rotate_about_shaft(v, jnp.asarray(a, points.dtype)) for v, a in zip(parts, angles * len(sides), strict=True)
+    ]
+    direct = sum(turned[1:blades], turned[0])
+    if plane is None:
+        return direct
+    return direct + plane.reflect_vectors(sum(turned[blades + 1 :], turned[blades]))
 
 
-def _check(points, strength, core, exponent, blades, ends):
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"Argument `points` must have shape (N, 3), but is {points.shape}")
-    for name, (value, shape) in ends.items():
-        if value.shape != (*shape, 3):
-            raise InputError(
-                f"Argument `strength` needs one value a segment, but is {shape} for `{name}` {value.shape}"
-            )
-    if core.shape != strength.shape:
-        raise InputError(f"Argument `core` must have the shape of strength, {strength.shape}, but is {core.shape}")
-    if not isinstance(core, jax.core.Tracer) and bool((core < 0).any()):
-        raise InputError(f"Argument `core` {core.shape} must not be negative, but its least value is {core.min()}")
+def _settings(exponent: float, blades: int, block: int | None, chained: bool) -> Settings:
     if not exponent >= 1:
         raise InputError(f"Argument `exponent` must be at least 1, but is {exponent}")
     if blades < 1:
         raise InputError(f"Argument `blades` must be at least 1, but is {blades}")
+    if block is not None and block < 1:
+        raise InputError(f"Argument `block` must be at least 1, but is {block}")
+    # on a CPU eight rows of pairs stay in cache; an accelerator wants fewer and larger steps
+    return Settings(exponent, chained, block or (8 if jax.default_backend() == "cpu" else 64))
+
+
+def _check_segments(points, strength, core, shape: tuple[int, ...]) -> None:
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"Argument `points` must have shape (N, 3), but is {points.shape}")
+    for name, value in (("strength", strength), ("core", core)):
+        if value.shape != shape:
+            raise InputError(f"Argument `{name}` must have one value a segment, {shape}, but is {value.shape}")
+    if not isinstance(core, jax.core.Tracer) and core.size and bool((core < 0).any()):
+        raise InputError(f"Argument `core` {core.shape} must not be negative, but its least value is {core.min()}")

@@ -1,6 +1,6 @@
 """Vortex cores: swirl profiles and their growth with wake age.
 
-Internals in rotor units: lengths over R, circulation and viscosity over ΩR², time as azimuth (rad), so Ω = 1 by default.
+In rotor units: lengths over R, circulation and viscosity over ΩR², time as azimuth (rad), so Ω = 1 by default.
 """
 
 import jax.numpy as jnp

@@ -1,0 +1,58 @@
+"""The Biot–Savart sum as one primitive with a hand-written rule for forward and for reverse mode.
+
+`jax.custom_vjp` would forbid forward mode, which linearisation needs, and `jax.custom_jvp` cannot share the pairs
+between value and tangent nor keep reverse mode from storing every pair. A primitive of `jax.experimental.hijax` takes
+both rules. Second derivatives differentiate the rules themselves.
+"""
+
+import jax
+from jax import Array
+from jax.experimental.hijax import VJPHiPrimitive, Zero, instantiate_zeros
+
+from rotorjax.wake.kernel_sweeps import Segments, Settings, cotangents, velocity, velocity_and_tangent
+
+
+class BiotSavart(VJPHiPrimitive):
+    """Velocity (3, N) at points (3, N) induced by segments, with O(N + S) memory in every mode."""
+
+    settings: Settings
+
+    def __init__(self, settings: Settings, points: Array, segments: Segments):
+        """Make the primitive for the shapes of these arguments."""
+        self.in_avals = (jax.typeof(points), jax.tree.map(jax.typeof, segments))
+        self.out_aval = jax.typeof(points)
+        self.params = {"settings": settings}
+        super().__init__()
+
+    def expand(self, points, segments):
+        """Value."""
+        return velocity(self.settings, points, segments)
+
+    def jvp(self, primals, tangents):
+        """Forward mode: value and tangent share their pairs."""
+        return velocity_and_tangent(self.settings, *primals, *_dense(tangents))
+
+    def vjp_fwd(self, nzs_in, points, segments):
+        """Reverse mode, forwards: keep the inputs alone."""
+        return self(points, segments), (points, segments)
+
+    def vjp_bwd_retval(self, res, outgrad):
+        """Reverse mode, backwards."""
+        return cotangents(self.settings, *res, _dense(outgrad))
+
+    def lin(self, nzs_in, *primals):
+        """Linearise: as forward mode, at a kept point."""
+        return self(*primals), primals
+
+    def linearized(self, residuals, *tangents):
+        """Apply the linear map."""
+        return velocity_and_tangent(self.settings, *residuals, *_dense(tangents))[1]
+
+    def batch_dim_rule(self, axis_data, in_dims):
+        """Put the batch axis of the result first."""
+        return 0
+
+
+def _dense(tree):
+    """Symbolic zeros as arrays."""
+    return jax.tree.map(instantiate_zeros, tree, is_leaf=lambda x: isinstance(x, Zero))

@@ -1,0 +1,157 @@
+"""The Biot–Savart sum over all pairs: velocity, its tangent and its cotangent, a few segments at a time.
+
+Each step of a scan takes a block of U segments against all N points, with points along the vector lanes: the scalars
+of the pairs come out as (U, N) arrays that stay in cache, then the U rows are added up. Memory is O(N U + S).
+Written so that XLA's CPU back end makes each of these one vectorised, two-core loop; benchmarks/README.md tells how.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from rotorjax.wake.kernel_pairs import Vector, add, columns, cross, dot, influence, pairs, slopes, subtract
+
+
+class Segments(NamedTuple):
+    """S segments: ends (3, S), circulation over 4π (S,) and softening e = |l|² r_c² (S,)."""
+
+    start: Array
+    end: Array
+    strength: Array
+    soft: Array
+
+
+class Settings(NamedTuple):
+    """exponent: Vatistas n. chained: each segment starts where the last one ended. block: segments a step."""
+
+    exponent: float
+    chained: bool
+    block: int
+
+
+class Block(NamedTuple):
+    """Rows of one step's U segments: ends, edge and strength times edge (3, U); strength and softening (U,)."""
+
+    start: Array
+    end: Array
+    edge: Array
+    whirl: Array
+    strength: Array
+    soft: Array
+
+
+def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
+    """Velocity (3, N) at points (3, N)."""
+    x = tuple(points)
+
+    def step(total: Vector, block: Block):
+        k = influence(pairs(x, block.start, block.end, block.soft, settings.chained), settings.exponent)
+        for u in range(k.shape[0]):
+            c = cross(block.whirl[:, u], subtract(x, block.start[:, u]))
+            total = add(total, _times(k[u], c))
+        return total, None
+
+    return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(_rows(segments), settings))[0])
+
+
+def velocity_and_tangent(
+    settings: Settings, points: Array, segments: Segments, points_t: Array, segments_t: Segments
+) -> tuple[Array, Array]:
+    """Velocity and its directional derivative in one sweep (…_t: tangents), (3, N) each."""
+    x, x_t = tuple(points), tuple(points_t)
+
+    def step(totals: tuple[Vector, Vector], blocks: tuple[Block, Block]):
+        (total, total_t), (block, block_t) = totals, blocks
+        pair = pairs(x, block.start, block.end, block.soft, settings.chained)
+        f = slopes(pair, settings.exponent)
+        r1_t, r2_t = subtract(x_t, columns(block_t.start)), subtract(x_t, columns(block_t.end))
+        stretch = dot(columns(block.edge), columns(block_t.edge))
+        inner = f.rho * stretch + f.kappa1 * dot(pair.r1, r1_t) - f.kappa2 * dot(pair.r2, r2_t)
+        k, k_t = f.k, (inner - f.k_e * block_t.soft[:, None]) * f.w
+        for u in range(k.shape[0]):
+            r, r_t = subtract(x, block.start[:, u]), subtract(x_t, block_t.start[:, u])
+            c = cross(block.whirl[:, u], r)
+            c_t = add(cross(block_t.whirl[:, u], r), cross(block.whirl[:, u], r_t))
+            total = add(total, _times(k[u], c))
+            total_t = add(total_t, add(_times(k_t[u], c), _times(k[u], c_t)))
+        return (total, total_t), None
+
+    rows, rows_t = jax.jvp(_rows, (segments,), (segments_t,))
+    both = _blocks(rows, settings), _blocks(rows_t, settings)
+    total, total_t = jax.lax.scan(step, (_zeros(points), _zeros(points)), both)[0]
+    return jnp.stack(total), jnp.stack(total_t)
+
+
+def cotangents(settings: Settings, points: Array, segments: Segments, weight: Array) -> tuple[Array, Segments]:
+    """Derivatives of sum(weight * velocity) with respect to points and segments, in one sweep.
+
+    With a = W w·c for the weight w, a pair of unit strength gives its start −ρa l − κ₁a r₁ − k r₂ × w, its end
+    ρa l + κ₂a r₂ + k r₁ × w, and its point minus the sum of both. The sums over points are products with [x, 1]
+    and [w, x × w], with x measured from the points' mean to keep digits.
+    """
+    p, w = tuple(points), tuple(weight)
+    centre = points.mean(axis=1, keepdims=True)
+    x = tuple(points - centre)
+    one = jnp.ones_like(x[0])
+    moments, swirls = jnp.stack([*x, one], axis=1), jnp.stack([*w, *cross(x, w)], axis=1)
+
+    def step(totals: tuple[Vector, Vector], block: Block):
+        turn, pull = totals
+        pair = pairs(p, block.start, block.end, block.soft, settings.chained)
+        f = slopes(pair, settings.exponent)
+        a = dot(w, cross(pair.edge, pair.r1)) * f.w
+        kappa1, kappa2 = a * f.kappa1, a * f.kappa2
+        for u in range(f.k.shape[0]):
+            g, r1, r2 = block.strength[u], subtract(p, block.start[:, u]), subtract(p, block.end[:, u])
+            turn = add(turn, _times(f.k[u], tuple(block.whirl[:, u])))
+            pull = add(pull, subtract(_times(kappa1[u], _times(g, r1)), _times(kappa2[u], _times(g, r2))))
+        sums = kappa1 @ moments, kappa2 @ moments, f.k @ swirls, (a * f.rho) @ one, (a * f.k_e) @ one
+        return (turn, pull), sums
+
+    blocks = _blocks(_rows(segments), settings)
+    (turn, pull), sums = jax.lax.scan(step, (_zeros(points), _zeros(points)), blocks)
+    sums = [s.reshape(-1, *s.shape[2:])[: segments.strength.shape[0]].T for s in sums]
+    return jnp.stack(add(pull, cross(w, turn))), _gather(segments, centre, *sums)
+
+
+def _gather(segments: Segments, centre: Array, first: Array, second: Array, swirl: Array, rho: Array, k_e: Array):
+    """Cotangents of the segments from their sums over the points."""
+    start, end, g = tuple(segments.start - centre), tuple(segments.end - centre), segments.strength
+    edge = subtract(end, start)
+    r1_w, r2_w = (subtract(tuple(swirl[3:]), cross(r, tuple(swirl[:3]))) for r in (start, end))
+    at_start = [-g * (rho * edge[i] + first[i] - start[i] * first[3] + r2_w[i]) for i in range(3)]
+    at_end = [g * (rho * edge[i] + second[i] - end[i] * second[3] + r1_w[i]) for i in range(3)]
+    return Segments(jnp.stack(at_start), jnp.stack(at_end), dot(edge, r1_w), -g * k_e)
+
+
+def _rows(segments: Segments) -> Block:
+    """What every step needs of the segments."""
+    edge = segments.end - segments.start
+    return Block(segments.start, segments.end, edge, segments.strength * edge, segments.strength, segments.soft)
+
+
+def _blocks(rows: Block, settings: Settings) -> Block:
+    """Cut S segments into steps of U, (steps, …, U); the last step is filled up with segments of no length or strength.
+
+    They stand where the last segment ends, which keeps a chain a chain.
+    """
+    steps = -(-rows.strength.shape[0] // settings.block)
+    missing = steps * settings.block - rows.strength.shape[0]
+    last = rows.end[:, -1:]
+    fill = Block(last, last, 0 * last, 0 * last, 0 * rows.strength[-1:], rows.soft[-1:])
+
+    def cut(row: Array, filler: Array) -> Array:
+        full = jnp.concatenate([row, jnp.repeat(filler, missing, axis=-1)], axis=-1)
+        return jnp.moveaxis(full.reshape(*row.shape[:-1], steps, settings.block), -2, 0)
+
+    return Block(*map(cut, rows, fill))
+
+
+def _times(scale: Array, vector: Vector) -> Vector:
+    return scale * vector[0], scale * vector[1], scale * vector[2]
+
+
+def _zeros(points: Array) -> Vector:
+    return (jnp.zeros_like(points[0]),) * 3
