@@ -86,9 +86,9 @@ def test_p_against_scipy():
 
 def test_p_against_mpmath_to_twelve_digits():
     nu = np.array([0.05, 0.31, 0.77, 0.999])
-    mine = np.array(legendre_p(PAIRS, jnp.array(nu)))
+    mine = np.array(legendre_p(PAIRS[::5], jnp.array(nu)))
     with mp.workdps(50):
-        for (m, n), row in zip(PAIRS, mine, strict=True):
+        for (m, n), row in zip(PAIRS[::5], mine, strict=True):
             for x, value in zip(nu, row, strict=True):
                 z = mp.mpf(float(x))
                 norm = mp.sqrt(mp.factorial(n + m) / mp.factorial(n - m) / (2 * n + 1)) * (1 - z**2) ** (mp.mpf(m) / 2)
