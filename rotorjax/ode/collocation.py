@@ -45,7 +45,7 @@ class Collocation(eqx.Module):
         nodes = jax.tree.leaves(x)[0].shape[0]
         total = nodes * self.copies
         table = fourier_differentiation(total)[:nodes] * 2 * jnp.pi
-        times = t0 + period * jnp.arange(nodes) / total
+        times = t0 + period * jnp.arange(nodes, dtype=period.dtype) / total
         slope = jax.vmap(lambda t, y: self.rhs(t, y, *args))(times, x)
 
         def leaf(whole: Array, right: Array) -> Array:

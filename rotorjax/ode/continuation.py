@@ -91,7 +91,7 @@ def continuation(
     while parameters[-1] != stop:
         left = stop - parameters[-1]
         # A sliver of a last step would only cost a solve: stretch this one over it.
-        target = stop if abs(left) <= 1.2 * step else parameters[-1] + np.sign(way) * step
+        target = stop if abs(left) <= 1.2 * step else parameters[-1] + float(np.sign(way)) * step
         guess = _secant(outcomes, parameters, target)
         found = solve(guess, target, outcomes[-1].memory)
         if found.converged and len(outcomes) > 1 and _jumped(found.x, guess, outcomes[-1].x, jump):

@@ -26,16 +26,13 @@ def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> 
     return jax.lax.map(column, jnp.arange(example.size), batch_size=min(chunk, example.size)).T
 
 
-def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int) -> Float[Array, " n"]:
+def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int, restart: int) -> Float[Array, " n"]:
     """Solve product(v) = b so that jax can differentiate and transpose it."""
     if method == "gmres":
-        # A long restart: short ones stagnate on wake-like spectra.
-        restart = min(b.size, 400)
-
         # Wrapped once more: jax's gmres alone starts from zeros_like(b), which transposition takes for an unknown.
         def solve(matrix: Callable, v: Array) -> Array:
             gmres = jax.scipy.sparse.linalg.gmres
-            return gmres(matrix, v, tol=1e-12, restart=restart, maxiter=5, solve_method="batched")[0]
+            return gmres(matrix, v, tol=1e-12, restart=min(restart, b.size), maxiter=5, solve_method="batched")[0]
 
         return jax.lax.custom_linear_solve(product, b, solve=solve, transpose_solve=solve)
     factors = jax.scipy.linalg.lu_factor(_materialise(product, b, chunk))
@@ -48,7 +45,9 @@ def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int)
 
 
 @eqx.filter_jit
-def _tangent(residual: Callable, solution: PyTree, args: tuple, args_dot: tuple, method: Method, chunk: int) -> PyTree:
+def _tangent(
+    residual: Callable, solution: PyTree, args: tuple, args_dot: tuple, method: Method, chunk: int, restart: int
+) -> PyTree:
     """Solve F_x dx = −F_p dp at the solution."""
     flat, unravel = ravel_pytree(solution)
 
@@ -60,7 +59,7 @@ def _tangent(residual: Callable, solution: PyTree, args: tuple, args_dot: tuple,
 
     _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
     _, product = jax.linearize(of_state, flat)
-    return unravel(_solve(product, -push, method, chunk))
+    return unravel(_solve(product, -push, method, chunk, restart))
 
 
 def attach(
@@ -69,6 +68,7 @@ def attach(
     *args: Any,
     method: Method = "dense",
     chunk: int = CHUNK,
+    restart: int = 200,
 ) -> PyTree:
     """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
 
@@ -90,7 +90,7 @@ def attach(
     def rule(primals: tuple, tangents: tuple) -> tuple:
         # The value again, and not `solution`: second derivatives must see how it moves.
         x = value(*primals)
-        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk)
+        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart)
 
     return value(jax.lax.stop_gradient(solution), traceable(args))
 
@@ -101,6 +101,7 @@ def implicit_orbit(
     *,
     method: Method = "dense",
     chunk: int = CHUNK,
+    restart: int = 200,
 ) -> Callable[..., PyTree]:
     """Make x(*args), the solution of residual(x, *args) = 0 that solver(*args) finds, differentiable both ways.
 
@@ -126,7 +127,7 @@ def implicit_orbit(
     @orbit.def_jvp
     def rule(primals: tuple, tangents: tuple) -> tuple:
         x = orbit(*primals)
-        return x, _tangent(residual, x, primals[0], tangents[0], method, chunk)
+        return x, _tangent(residual, x, primals[0], tangents[0], method, chunk, restart)
 
     return lambda *args: orbit(traceable(args))
 

@@ -17,6 +17,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from rotorjax.errors import InputError
 from rotorjax.ode.jacobian import CHUNK, dense_jacobian
 
+# Beyond this many corrections Broyden's inverse costs more to apply than it saves, and is stale.
+MOST_CORRECTIONS = 30
+TIGHTEST = 1e-8
+
 
 @dataclass(frozen=True)
 class Factor:
@@ -63,9 +67,13 @@ class Dense:
                 memory = Factor(scipy.linalg.lu_factor(jacobian, overwrite_a=True, check_finite=False))
         return memory.solve(-np.asarray(value)), memory
 
+    def retry(self, memory: Factor, fresh: bool) -> tuple[bool, None]:
+        """A reused Jacobian is made anew; a new one is as good as it gets."""
+        return not fresh, None
+
     def learn(self, memory: Factor, step: np.ndarray, change: np.ndarray, ratio: float) -> Factor | None:
         """Keep, correct or forget the factors."""
-        if self.reuse == "none" or ratio > self.slow:
+        if self.reuse == "none" or ratio > self.slow or len(memory.corrections) >= MOST_CORRECTIONS:
             return None
         if self.reuse == "chord":
             return memory
@@ -75,6 +83,24 @@ class Dense:
         if abs(bottom) < 1e-8 * (step @ step):
             return memory
         return replace(memory, corrections=(*memory.corrections, ((step - shift) / bottom, step)))
+
+
+@dataclass(frozen=True)
+class Forcing:
+    """Norm of the last residual and relative tolerance of the last linear solve; fixed: the next one is to be this."""
+
+    size: float
+    rtol: float
+    fixed: bool = False
+
+    def next(self, size: float, largest: float) -> float:
+        """Tolerance for a residual of norm `size`: choice 2 of Eisenstat & Walker with their safeguard."""
+        if self.fixed:
+            return self.rtol
+        rtol = 0.9 * (size / self.size) ** 2
+        if 0.9 * self.rtol**2 > 0.1:
+            rtol = max(rtol, 0.9 * self.rtol**2)
+        return min(largest, max(rtol, TIGHTEST))
 
 
 @dataclass(frozen=True)
@@ -92,17 +118,11 @@ class Krylov:
     forcing: float = 0.1
 
     def direction(
-        self, f: Callable, unravel: Callable, x: Array, args: PyTree, value: Array, memory: tuple[float, float] | None
-    ) -> tuple[np.ndarray, tuple[float, float]]:
+        self, f: Callable, unravel: Callable, x: Array, args: PyTree, value: Array, memory: Forcing | None
+    ) -> tuple[np.ndarray, Forcing]:
         """Solve J d = −value to the forcing tolerance."""
         size = float(jnp.linalg.norm(value))
-        rtol = self.forcing
-        if memory is not None:
-            last, last_rtol = memory
-            rtol = 0.9 * (size / last) ** 2
-            if 0.9 * last_rtol**2 > 0.1:
-                rtol = max(rtol, 0.9 * last_rtol**2)
-            rtol = min(self.forcing, max(rtol, 1e-8))
+        rtol = self.forcing if memory is None else memory.next(size, self.forcing)
         matrix = _operator(lambda v: _product(f, unravel, x, args, v), x)
         inverse = None
         if self.precondition is not None:
@@ -113,11 +133,15 @@ class Krylov:
         d, _ = gmres(
             matrix, -np.asarray(value), rtol=rtol, restart=min(self.restart, x.size), maxiter=self.restarts, M=inverse
         )
-        return d, (size, rtol)
+        return d, Forcing(size, rtol)
 
-    def learn(self, memory: Any, step: np.ndarray, change: np.ndarray, ratio: float) -> Any:
+    def learn(self, memory: Forcing, step: np.ndarray, change: np.ndarray, ratio: float) -> Forcing:
         """Keep what the next forcing tolerance needs."""
         return memory
+
+    def retry(self, memory: Forcing, fresh: bool) -> tuple[bool, Forcing]:
+        """Solve a hundred times tighter, as long as that is still tighter."""
+        return memory.rtol > TIGHTEST, replace(memory, rtol=max(memory.rtol / 100, TIGHTEST), fixed=True)
 
 
 class _Flat(eqx.Module):

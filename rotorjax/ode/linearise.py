@@ -63,7 +63,7 @@ def linearise(
     state's.
     """
     require_converged(orbit)
-    times = orbit.t if nodes is None else orbit.t[0] + orbit.period * jnp.arange(nodes) / nodes
+    times = orbit.t if nodes is None else orbit.t[0] + orbit.period * jnp.linspace(0, 1, nodes, endpoint=False)
     states = orbit.x if nodes is None else orbit.at(times)
     start = jax.tree.map(lambda leaf: leaf[0], states)
     u, p = traceable((u, p))

@@ -24,6 +24,13 @@ class LinearSolve(Protocol):
         """Return memory after a step that changed the residual by `change` and its size by `ratio`; None forgets."""
         ...
 
+    def retry(self, memory: Any, fresh: bool) -> tuple[bool, Any]:
+        """Return whether another direction is worth a try where the last one led nowhere or not far, and its memory.
+
+        fresh: the last direction was made without memory.
+        """
+        ...
+
 
 SMALLEST_STEP = 2.0**-10
 
@@ -71,8 +78,8 @@ def newton(
             direction, memory = linear.direction(residual, unravel, jnp.asarray(x), args, jnp.asarray(f), memory)
             share, new, new_f, new_size = _backtrack(evaluate, measure, x, direction, size)
             if new_size >= size:
-                memory = None
-                if fresh:
+                again, memory = linear.retry(memory, fresh)
+                if not again:
                     log.why = (
                         f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
                         "lowers the residual (a fold, a kink or the limit of precision)"
@@ -80,7 +87,10 @@ def newton(
                     break
                 continue
             done = log.note(new, new_size)
-            memory = linear.learn(memory, new - x, new_f - f, new_size / size) if share == 1 else None
+            if share == 1:
+                memory = linear.learn(memory, new - x, new_f - f, new_size / size)
+            else:
+                _, memory = linear.retry(memory, fresh)
             x, f, size = new, new_f, new_size
     return log.outcome(unravel, memory)
 

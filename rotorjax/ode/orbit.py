@@ -55,7 +55,7 @@ def make_orbit(t0: ArrayLike, x: PyTree, period: ArrayLike, outcome: Outcome) ->
     nodes = jnp.shape(jax.tree.leaves(x)[0])[0]
     period = jnp.asarray(period, float)
     return Orbit(
-        t=jnp.asarray(t0, float) + period * jnp.arange(nodes) / nodes,
+        t=jnp.asarray(t0, float) + period * jnp.arange(nodes, dtype=period.dtype) / nodes,
         x=x,
         period=period,
         residual=jnp.asarray(outcome.residual),

@@ -83,10 +83,10 @@ def test_order_is_five():
 def chain(t, x, n):
     """A damped chain with periodic stiffness: many states for Arnoldi."""
     q, v = x["q"], x["v"]
-    stiff = 1 + 0.3 * jnp.cos(t + jnp.arange(30) * 0.2)
+    stiff = 1 + 0.3 * jnp.cos(t + jnp.arange(30.0) * 0.2)
     left = jnp.concatenate([jnp.zeros(1), q[:-1]])
     right = jnp.concatenate([q[1:], jnp.zeros(1)])
-    return {"q": v, "v": -stiff * q + 0.2 * (left - 2 * q + right) - 0.05 * (1 + jnp.arange(30) / 10) * v}
+    return {"q": v, "v": -stiff * q + 0.2 * (left - 2 * q + right) - 0.05 * (1 + jnp.arange(30.0) / 10) * v}
 
 
 def test_arnoldi_agrees_with_dense():

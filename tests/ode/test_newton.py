@@ -64,7 +64,7 @@ def test_broyden_needs_fewer_jacobians():
 class Counted:
     def __init__(self, inner):
         self.inner, self.fresh = inner, 0
-        self.learn = inner.learn
+        self.learn, self.retry = inner.learn, inner.retry
 
     def direction(self, f, unravel, x, args, value, memory):
         self.fresh += memory is None
@@ -124,3 +124,18 @@ def test_bad_input():
         Dense(reuse="often")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="chunk"):
         dense_jacobian(jnp.sin, jnp.zeros(3), chunk=0)
+
+
+def test_krylov_solves_tighter_where_a_loose_direction_leads_nowhere():
+    """Badly scaled rows: GMRES at a tolerance of 0.9 finds a direction that does not lower the measure used."""
+    scale = jnp.array([1e4, 1.0, 1e-3])
+
+    def residual(x):
+        return scale * (x + 0.1 * jnp.roll(x, 1) ** 2 - jnp.array([1.0, 2.0, 3.0]))
+
+    def measure(f, x):
+        return float(np.abs(f / np.array(scale)).max())
+
+    linear = Counted(Krylov(forcing=0.9))
+    out = newton(residual, jnp.zeros(3), linear=linear, tol=1e-10, measure=measure)
+    assert out.converged
