@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from rotorjax.errors import InputError
-from rotorjax.ode.outcome import Log, Measure, Outcome, flat_value, flatten, relative_rms, traceable
+from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
 
 
 class _Window:
@@ -57,7 +57,8 @@ def anderson(
     Numbers in `args` may change from call to call without compiling again, as long as `g` is the same function.
     A run that diverges or is interrupted returns the best iterate with `converged` False and says why.
 
-    Raises InputError where a setting is out of range or x0 is not made of finite floating-point arrays.
+    Raises InputError where a setting is out of range, x0 is not made of finite floating-point arrays, or `g` returns
+    another structure.
     """
     if window < 1 or not 0 < mixing <= 1 or safeguard <= 1:
         raise InputError(
@@ -67,7 +68,7 @@ def anderson(
     args = traceable(args)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        return np.asarray(flat_value(g, unravel, jnp.asarray(x, flat.dtype), args)) - x
+        return np.asarray(flat_residual(g, unravel, jnp.asarray(x, flat.dtype), args)) - x
 
     past, share = _Window(window), mixing
     x = np.asarray(flat)

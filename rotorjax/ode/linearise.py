@@ -15,7 +15,7 @@ from rotorjax.ode.jacobian import CHUNK, dense_jacobian
 from rotorjax.ode.labels import labels, select, units_of
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import Orbit, require_converged
-from rotorjax.ode.outcome import flat_value, traceable
+from rotorjax.ode.outcome import flat_value, flatten, traceable
 from rotorjax.ode.structure import require_like
 
 Output = Callable[[Array, PyTree, PyTree, PyTree], PyTree]
@@ -67,11 +67,11 @@ def linearise(
     states = orbit.x if nodes is None else orbit.at(times)
     start = jax.tree.map(lambda leaf: leaf[0], states)
     u, p = traceable((u, p))
-    require_like(eqx.filter_eval_shape(rhs, times[0], start, u, p), start, "rhs(t, x, u, p)")
-    x_names, u_names = labels(start, "x"), labels(u, "u")
-    y_names = labels(eqx.filter_eval_shape(output, times[0], start, u, p), "y")
+    slope, result = eqx.filter_eval_shape(lambda *a: (rhs(*a), output(*a)), times[0], start, u, p)
+    require_like(slope, start, "rhs(t, x, u, p)")
+    x_names, u_names, y_names = labels(start, "x"), labels(u, "u"), labels(result, "y")
     chosen, kept = select(u_names, inputs, "inputs"), select(y_names, outputs, "outputs")
-    flat_u, of_input = ravel_pytree(u)
+    flat_u, of_input = flatten(u, "u")
     of_state = ravel_pytree(start)[1]
     joint = _Joint(rhs, output, of_state, of_input, tuple(map(int, chosen)))
     flat_x = jax.vmap(lambda x: ravel_pytree(x)[0])(states)

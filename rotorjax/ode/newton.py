@@ -3,14 +3,12 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
 from rotorjax.ode.linear import Dense
-from rotorjax.ode.outcome import Log, Measure, Outcome, flat_value, flatten, relative_rms, traceable
-from rotorjax.ode.structure import require_like
+from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
 
 
 class LinearSolve(Protocol):
@@ -61,10 +59,9 @@ def newton(
     linear = Dense() if linear is None else linear
     flat, unravel = flatten(x0)
     args = traceable(args)
-    require_like(eqx.filter_eval_shape(residual, x0, *args), x0, "residual(x, ...)")
 
     def evaluate(x: np.ndarray) -> np.ndarray:
-        return np.asarray(flat_value(residual, unravel, jnp.asarray(x, flat.dtype), args))
+        return np.asarray(flat_residual(residual, unravel, jnp.asarray(x, flat.dtype), args))
 
     x = np.asarray(flat)
     with Log("newton", tol, max_iterations, progress) as log:

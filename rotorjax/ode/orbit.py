@@ -95,7 +95,8 @@ def require_converged(orbit: Orbit) -> None:
 
 def require_periodic(rhs: Rhs, t0: ArrayLike, x: PyTree, period: ArrayLike, *args: PyTree, tol: float = 1e-6) -> None:
     """Raise InputError where rhs at (t0, x) differs from that one period later by more than tol (relative rms)."""
-    now, later = (np.asarray(ravel_pytree(rhs(t, x, *args))[0]) for t in (t0, jnp.asarray(t0) + period))
+    rate = eqx.filter_jit(rhs)
+    now, later = (np.asarray(ravel_pytree(rate(t, x, *args))[0]) for t in (t0, jnp.asarray(t0) + period))
     gap = relative_rms(later - now, now)
     if gap > tol:
         length = float(jnp.asarray(period))

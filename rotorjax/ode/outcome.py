@@ -15,6 +15,7 @@ from jaxtyping import Array, Float, PyTree
 from tqdm import tqdm
 
 from rotorjax.errors import InputError
+from rotorjax.ode.structure import require_like
 
 Measure = Callable[[np.ndarray, np.ndarray], float]
 
@@ -46,7 +47,7 @@ def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(f)))) / (scale if scale > 0 else 1.0)
 
 
-def flatten(x: PyTree) -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
+def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
     """Flat vector of a state and the way back, after checking that it is made of finite floating-point numbers.
 
     Raises InputError where a leaf is not.
@@ -55,12 +56,12 @@ def flatten(x: PyTree) -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
     for path, leaf in leaves:
         if not jnp.issubdtype(jnp.result_type(leaf), jnp.floating):
             raise InputError(
-                f"Argument `x0` must hold floating-point arrays only, but {jax.tree_util.keystr(path) or 'it'} "
-                f"is {jnp.result_type(leaf)}: cast it, or pass it among the arguments"
+                f"Argument `{name}` must hold floating-point arrays only, but {jax.tree_util.keystr(path) or 'it'} "
+                f"is {jnp.result_type(leaf)}: cast it or pass it elsewhere"
             )
     flat, unravel = ravel_pytree(x)
     if not bool(jnp.all(jnp.isfinite(flat))):
-        raise InputError("Argument `x0` must be finite, but holds NaN or infinity")
+        raise InputError(f"Argument `{name}` must be finite, but holds NaN or infinity")
     return flat, unravel
 
 
@@ -68,6 +69,14 @@ def traceable(args: PyTree) -> PyTree:
     """Make Python and numpy numbers into arrays, so that jitted kernels take new values without compiling again."""
     number = (float, complex, np.ndarray, np.floating)
     return jax.tree.map(lambda v: jnp.asarray(v) if isinstance(v, number) else v, args)
+
+
+@eqx.filter_jit
+def flat_residual(f: Callable, unravel: Callable, x: Float[Array, " n"], args: PyTree) -> Float[Array, " n"]:
+    """f(x, *args) between flat vectors, refused where it is not shaped like x: checked while tracing, so once."""
+    value = f(unravel(x), *args)
+    require_like(value, unravel(x), "residual(x, ...)")
+    return ravel_pytree(value)[0]
 
 
 @eqx.filter_jit

@@ -126,7 +126,6 @@ def step(rhs: Rhs, t: ArrayLike, x: PyTree, dt: ArrayLike, *args: Any, tableau: 
 
     Raises InputError where `rhs` returns something that is not shaped like `x`.
     """
-    require_like(jax.eval_shape(rhs, t, x, *args), x, "rhs(t, x, ...)")
     stages = tableau.stages
     lower = [[float(v) for v in row] + [0.0] * (stages - i) for i, row in enumerate(tableau.a)]
 
@@ -139,6 +138,7 @@ def step(rhs: Rhs, t: ArrayLike, x: PyTree, dt: ArrayLike, *args: Any, tableau: 
     def stage(k: PyTree, row: tuple[Array, Array, Array]) -> tuple[PyTree, None]:
         i, weights, c = row
         slope = rhs(t + c * dt, combine(weights, k), *args)
+        require_like(slope, x, "rhs(t, x, ...)")
         return jax.tree.map(lambda ks, s: ks.at[i].set(s), k, slope), None
 
     time = jnp.result_type(t, dt, float)
