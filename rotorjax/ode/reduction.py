@@ -80,15 +80,14 @@ def residualise(model: LinearModel, order: int) -> Reduced:
     keep = order
     while 0 < keep < model.order and size[keep] - size[keep - 1] <= 1e-9 * size[keep]:
         keep -= 1
-    if keep in (0, model.order):
-        return Reduced(model, None, np.zeros(0)) if keep else _apart(order)
+    if keep == 0:
+        raise InputError(f"Argument `order` must not part the slowest complex pair, but is {order}: ask for one more")
+    if keep == model.order:
+        return Reduced(model, None, np.zeros(0))
     cut = (size[keep - 1] + size[keep]) / 2
-    v, w, _ = _split(model.a, lambda re, im: bool(np.hypot(re, im) <= cut))
+    # Counted again: eigenvalues of a non-normal A move with rounding, and only those of this Schur form are parted.
+    v, w, keep = _split(model.a, lambda re, im: bool(np.hypot(re, im) <= cut))
     return Reduced(_fold(_transform(model, v, w, "slow"), keep, "slow"), None, np.zeros(0))
-
-
-def _apart(order: int) -> Reduced:
-    raise InputError(f"Argument `order` must not part the slowest complex pair, but is {order}: ask for one more")
 
 
 def _root(gramian: np.ndarray) -> np.ndarray:

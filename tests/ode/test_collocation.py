@@ -70,6 +70,15 @@ def test_convergence_is_geometric():
     assert rate == pytest.approx(1.5 - np.sqrt(1.25), rel=0.05)
 
 
+def test_float32():
+    with jax.enable_x64(False):
+        orbit = collocate(peaked, jnp.zeros(25), 2 * np.pi, 1.5, tol=1e-5)
+        exact = 1 / (1.5 - np.cos(np.array(orbit.t)))
+    assert orbit.converged
+    assert orbit.x.dtype == jnp.float32
+    np.testing.assert_allclose(orbit.x, exact, rtol=1e-4)
+
+
 def test_started_elsewhere_in_time():
     orbit = collocate(peaked, jnp.zeros(33), 2 * np.pi, 1.5, t0=0.7, tol=1e-12)
     np.testing.assert_allclose(orbit.x, 1 / (1.5 - jnp.cos(orbit.t)), atol=1e-6)
