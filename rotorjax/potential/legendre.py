@@ -138,8 +138,8 @@ def _chebyshev_basis(x: Float[Array, "*N"]) -> Float[Array, "T ..."]:
     return rows
 
 
-def _powers(x: Float[Array, "*N"], exponents: list[int]) -> Float[Array, "L ..."]:
-    """x to each exponent, by doubling."""
+def powers(x: Float[Array, "*N"], exponents: list[int]) -> Float[Array, "L ..."]:
+    """Return x to each exponent, by doubling (no 0/0 in any derivative at x = 0)."""
     rows = jnp.stack([jnp.ones_like(x), x])
     while len(rows) <= max(exponents):
         rows = jnp.concatenate([rows, rows[1:] * rows[-1]])
@@ -155,9 +155,9 @@ def legendre_q(pairs: Pairs, eta: Float[Array, "*N"]) -> Float[Array, "L ..."]:
     u = e * e / (1 + e * e)
     table = jnp.asarray(_chebyshev_table(pairs), eta.dtype)
     rows = jnp.tensordot(table, _chebyshev_basis(4 * u - 1), 1, precision=jax.lax.Precision.HIGHEST)
-    rows = rows * jnp.sqrt(2 * (1 - u)) * _powers(e, [n + 1 for _, n in pairs])
+    rows = rows * jnp.sqrt(2 * (1 - u)) * powers(e, [n + 1 for _, n in pairs])
     flattening = [_flattening(m, n) for m, n in pairs]
-    return rows * _powers(1 - u, flattening) if any(flattening) else rows
+    return rows * powers(1 - u, flattening) if any(flattening) else rows
 
 
 @legendre_q.defjvp
