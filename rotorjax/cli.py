@@ -1,0 +1,52 @@
+"""The command line: `rotorjax COMMAND …`. Bad input is one line on stderr and exit code 2."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from rotorjax import __version__
+from rotorjax.errors import InputError
+
+DIVERGED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, like every other bad input."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the complaint and leave with exit code 2."""
+        print(f"{self.prog}: error: {message} (try `{self.prog} --help`)", file=sys.stderr)
+        sys.exit(BAD_INPUT)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of all commands; each module of `rotorjax.commands` registers its own."""
+    from rotorjax.commands import inflow, study
+
+    top = Parser(prog="rotorjax", description="Rotor inflow near the ground: finite-state model and free vortex wake.")
+    top.add_argument("--version", action="version", version=f"rotorjax {__version__}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
+    for module in (study, inflow):
+        module.register(commands)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code: 0, 1 where a case did not converge, 2 for bad input."""
+    chosen = parser().parse_args(arguments)
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    try:
+        return chosen.run(chosen)
+    except InputError as error:
+        print(f"rotorjax {chosen.command}: error: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print(f"rotorjax {chosen.command}: interrupted; finished cases are kept", file=sys.stderr)
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(main())

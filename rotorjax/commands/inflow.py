@@ -1,0 +1,79 @@
+"""`rotorjax inflow`: one case, in or out of ground effect, with one model or both."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from rotorjax.commands.arguments import add_harmonics, add_rotor
+
+
+def register(commands: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "inflow",
+        help="inflow of one case",
+        description="Solve one steady case and print thrust, power and inflow. Exit code 1 where it did not converge.",
+    )
+    add_rotor(parser)
+    parser.add_argument(
+        "--height", type=float, metavar="H", help="hub over ground, over R (none: out of ground effect)"
+    )
+    parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
+    parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
+    parser.add_argument(
+        "--model",
+        choices=("vpbfsm", "freewake", "both"),
+        default="both",
+        help="vpbfsm: with its own blade loads (both)",
+    )
+    parser.add_argument("--quick", action="store_true", help="coarser free wake")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="picture: .png, .pdf or .svg")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="numbers, with the keys of a case of summary.json")
+    parser.add_argument("--netcdf", type=Path, metavar="FILE", help="all arrays, labelled")
+    add_harmonics(parser)
+    parser.set_defaults(run=run)
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Solve the case, print it and write what was asked for; the exit code."""
+    from tqdm import tqdm
+
+    from rotorjax.io import netcdf
+    from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.study.record import summary_entry
+    from rotorjax.study.settings import study_settings
+    from rotorjax.study.single import check_case, single_case
+    from rotorjax.study.single_output import check_picture, picture, table
+
+    case = _case(chosen)
+    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick)
+    check_case(case, settings)
+    check_picture(chosen.plot)
+    for path in (chosen.plot, chosen.json, chosen.netcdf):
+        if path is not None:  # before the work, not after it
+            make_folder(path.parent)
+    with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
+
+        def progress(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}")
+
+        data, reference = single_case(case, settings, chosen.model, progress)
+    print(table(data, settings, reference))
+    if chosen.json is not None:
+        write_json(chosen.json, summary_entry(data, reference))
+    if chosen.netcdf is not None:
+        netcdf.write(chosen.netcdf, data)
+    if chosen.plot is not None:
+        picture(data, reference, chosen.plot)
+    return 0 if bool(data.get("converged", 1)) else 1
+
+
+def _case(chosen: argparse.Namespace):
+    from rotorjax.errors import InputError
+    from rotorjax.study.cases import Case
+
+    if chosen.height is None and chosen.slope:
+        raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {chosen.slope:g} deg")
+    case = Case(chosen.height, chosen.slope)
+    _ = case.ground
+    return case

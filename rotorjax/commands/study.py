@@ -1,0 +1,45 @@
+"""`rotorjax study`: the paper's evaluation with both models, as figures, data and a report."""
+
+import argparse
+import time
+from pathlib import Path
+
+from rotorjax.commands.arguments import add_harmonics, add_rotor
+
+
+def register(commands: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "study",
+        help="the paper's evaluation in ground effect with both models",
+        description="Solve every case with the free wake and the VPBFSM and write figures, cases.nc, summary.json and "
+        "report.md. Finished cases are kept: the same command continues where it stopped. Exit code 1 where a case did "
+        "not converge.",
+    )
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
+    parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake")
+    parser.add_argument("--heights", nargs="*", type=float, metavar="H", help="level heights over R")
+    parser.add_argument("--slopes", nargs="*", type=float, metavar="DEG", help="slopes at h = 1, in degrees")
+    add_rotor(parser)
+    add_harmonics(parser)
+    parser.set_defaults(run=run)
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Run the study; the exit code."""
+    from rotorjax.study.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
+    from rotorjax.study.output import write_all
+    from rotorjax.study.run import solve_cases
+    from rotorjax.study.settings import study_settings
+
+    started = time.perf_counter()
+    heights = (QUICK_HEIGHTS if chosen.quick else HEIGHTS) if chosen.heights is None else chosen.heights
+    slopes = (QUICK_SLOPES_DEG if chosen.quick else SLOPES_DEG) if chosen.slopes is None else chosen.slopes
+    cases = study_cases(heights, slopes)
+    settings = study_settings(chosen.rotor, chosen.collective, harmonics=chosen.harmonics, quick=chosen.quick)
+    result = solve_cases(cases, settings, chosen.out)
+    write_all(result.cases, settings, chosen.out, started)
+    print(f"{len(result.cases)} cases in {time.perf_counter() - started:.0f} s: {chosen.out / 'report.md'}")
+    if result.diverged:
+        print("not converged: " + ", ".join(result.diverged))
+    return 1 if result.diverged else 0

@@ -1,0 +1,183 @@
+"""report.md: settings, cases, a table for each figure, the paper's claims with verdicts, where the models part."""
+
+import resource
+import sys
+from collections.abc import Sequence
+from json import loads
+
+import numpy as np
+import xarray as xr
+
+from rotorjax.study.cases import Case
+from rotorjax.study.claim import Claim
+from rotorjax.study.claims import checks, paper_claims
+from rotorjax.study.dataset import present
+from rotorjax.study.divergence import where_they_part
+from rotorjax.study.markdown import table
+from rotorjax.study.reading import Reading
+
+TABLE_R = (0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.95)
+
+
+def report(merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wall_time_s: float) -> str:
+    """The report in Markdown. drawn, missing: figures that were and were not drawn; wall_time_s: of the whole study."""
+    reading = Reading(merged)
+    parts = [
+        "# Rotor inflow in ground effect: free vortex wake and VPBFSM",
+        _introduction(merged, wall_time_s),
+        "## Cases\n\n" + _case_table(reading),
+        "## What both models must show\n\n" + _claim_table(checks(reading)),
+        "## The paper's claims\n\n" + _claim_table(paper_claims(reading)),
+        "## Where the two models part, and why\n\n" + where_they_part(reading),
+        "## Figures\n\n" + _figures(reading, drawn, missing),
+        "## Settings\n\n" + _settings(merged),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def peak_memory_gb() -> float:
+    """Largest memory this process has held, in GB."""
+    kilo = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return kilo * (1 if sys.platform == "darwin" else 1024) / 1e9
+
+
+def _introduction(merged: xr.Dataset, wall_time_s: float) -> str:
+    settings = loads(merged.attrs["settings"])
+    failed = [str(n) for n in merged["case"].to_numpy()[merged["converged"].to_numpy() == 0]]
+    text = (
+        f"Rotor {settings['rotor']}, collective {settings['collective_deg']:g}°, rigid blades, hover. Each case is "
+        "solved with the free wake; its loading dC_T/dr̄(r̄, ψ) drives the VPBFSM, once with the paper's printed factor "
+        "(π/7)^(η²) on the r = j terms and once with the exact image of the rigid wake cylinder. All inflow is induced, "
+        "positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
+        f"{float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, 90° the "
+        "advancing, 180° the valley, 270° the retreating side.\n\n"
+        f"{len(merged['case'])} cases, {wall_time_s:.0f} s, of which {float(merged['compile_time_s'].sum()):.0f} s "
+        f"compiling the free wake; peak memory {peak_memory_gb():.2f} GB. "
+    )
+    if not failed:
+        return text + "All cases converged."
+    why = merged["why"].to_numpy()[merged["converged"].to_numpy() == 0]
+    return text + "**Not converged:** " + "; ".join(f"{n} ({w})" for n, w in zip(failed, why, strict=True)) + "."
+
+
+def _case_table(reading: Reading) -> str:
+    head = ["case", "C_T", "C_Pi", "mean inflow/ΩR", "residual/R", "ΔC_T", "converged", "free wake: ground"]
+    head += ["VPBFSM: mean/ΩR", "VPBFSM: ground", "exact image: mean/ΩR", "rms difference, printed factor"]
+    head += ["rms difference, exact image", "time/s"]
+    names = ["CT", "CP_induced", "free_wake_mean_inflow", "free_wake_residual", "free_wake_load_change", "converged"]
+    names += ["free_wake_ground_normal_velocity_rms", "vpbfsm_mean_inflow", "vpbfsm_ground_normal_velocity_rms"]
+    names += ["exact_image_mean_inflow", "vpbfsm_inflow_rms_difference", "exact_image_inflow_rms_difference"]
+    names += ["wall_time_s"]
+    rows = []
+    for case in present(reading.merged):
+        values: list[object] = [
+            reading.number(case, name) if name in reading.merged else float("nan") for name in names
+        ]
+        values[5] = "yes" if values[5] else "**no**"
+        rows.append([case.label, *values])
+    note = (
+        "\n\nResidual: rms node displacement when the wake is passed once through its own velocities. ΔC_T: relative "
+        "change of C_T in that pass. Ground: rms normal velocity on the plane, over √(C_T/2) for the free wake and over "
+        "the incoming flow inside the wake radius for the VPBFSM. Rms difference: area-weighted over "
+        "0.25 ≤ r̄ ≤ 0.95, both inflows over the OGE mean."
+    )
+    return table(head, rows) + note
+
+
+def _claim_table(claims: Sequence[Claim]) -> str:
+    verdict = {True: "holds", False: "**does not hold**", None: "not examined"}
+    return table(
+        ["where", "claim", "verdict", "evidence"], [(c.where, c.text, verdict[c.holds], c.evidence) for c in claims]
+    )
+
+
+def _figures(reading: Reading, drawn: Sequence[str], missing: Sequence[str]) -> str:
+    parts = []
+    for name in drawn:
+        title = f"Fig. {name.removeprefix('fig').lstrip('0')}" if name.startswith("fig") else "Overview"
+        parts.append(f"### {title}\n\n![{title}]({name}.png)")
+        if (rows := FIGURE_TABLES.get(name)) and (text := rows(reading)):
+            parts.append(text)
+    if missing:
+        parts.append("Not drawn, for lack of cases: " + ", ".join(missing) + ".")
+    return "\n\n".join(parts)
+
+
+def _settings(merged: xr.Dataset) -> str:
+    settings = loads(merged.attrs["settings"])
+    rows = [(f"`{k}`", ", ".join(map(str, v)) if isinstance(v, list) else v) for k, v in settings.items()]
+    return table(["setting", "value"], rows) + f"\n\nFingerprint: `{merged.attrs['fingerprint']}`"
+
+
+def _along_radius(reading: Reading, cases: Sequence[Case], name: str, scale: float, valley: bool = False) -> str:
+    """Table of a station array at a few radii, for each case; on a slope mountain and valley side."""
+    rows = []
+    for case in cases:
+        if not reading.has(case):
+            continue
+        field = reading.field(case, name) * scale
+        sides = {"": 0}
+        if case.slope_deg and valley:
+            sides = {", mountain": 0, ", valley": field.shape[0] // 2}
+        for side, k in sides.items():
+            rows.append([case.label + side, *(float(np.interp(r, reading.r, field[k])) for r in TABLE_R)])
+    return table(["r̄ =", *map(str, TABLE_R)], rows) if rows else ""
+
+
+def _inflow_table(reading: Reading, cases: Sequence[Case], models: Sequence[str]) -> str:
+    title = {"free_wake": "free wake", "vpbfsm": "VPBFSM, printed factor", "exact_image": "VPBFSM, exact image"}
+    texts = []
+    for model in models:
+        text = _along_radius(reading, cases, f"{model}_inflow", 1 / reading.reference, valley=True)
+        if text:
+            texts.append(f"{title[model]}:\n\n{text}")
+    return "\n\n".join(texts)
+
+
+def _terms_table(reading: Reading) -> str:
+    if "inflow_rms_difference_by_terms" not in reading.merged:
+        return ""
+    values = reading.merged["inflow_rms_difference_by_terms"].to_numpy()
+    return table(
+        ["pressure terms", *map(str, reading.merged["terms"].to_numpy())], [["rms difference", *map(float, values)]]
+    )
+
+
+def _sectors_table(reading: Reading, cases: Sequence[Case]) -> str:
+    """Mean loading inboard, outboard and at the tip on four sides."""
+    rows = []
+    zones = {"0.2–0.55": (0.2, 0.55), "0.6–0.9": (0.6, 0.9), "0.9–1": (0.9, 1.0)}
+    for case in cases:
+        if reading.has(case):
+            rows += [
+                [case.label, name, *(1e3 * reading.sector(case, zone, side) for side in (0.0, 90.0, 180.0, 270.0))]
+                for name, zone in zones.items()
+            ]
+    head = ["case", "r̄", "mountain 0°", "advancing 90°", "valley 180°", "retreating 270°"]
+    return "1000 dC_T/dr̄, mean within 60° of each side:\n\n" + table(head, rows) if rows else ""
+
+
+BOTH, ALL = ("free_wake", "vpbfsm"), ("free_wake", "vpbfsm", "exact_image")
+OGE = Case()
+FIGURE_TABLES = {
+    "fig06": lambda q: "1000 dC_T/dr̄:\n\n" + _along_radius(q, [OGE, *q.level()], "free_wake_dct_dr", 1e3),
+    "fig07": lambda q: (
+        "1000 dC_T/dr̄, free wake, then VPBFSM:\n\n"
+        + _along_radius(q, [OGE], "free_wake_dct_dr", 1e3)
+        + "\n\n"
+        + _along_radius(q, [OGE], "vpbfsm_dct_dr", 1e3)
+    ),
+    "fig08a": _terms_table,
+    "fig08b": lambda q: _inflow_table(q, [OGE], BOTH),
+    "fig09": lambda q: _inflow_table(q, [Case(1.0)], ALL),
+    "fig10a": lambda q: _inflow_table(q, [OGE, *q.level()], ("free_wake",)),
+    "fig10b": lambda q: _inflow_table(q, [OGE, *q.level()], ("vpbfsm",)),
+    "fig11": lambda q: _sectors_table(q, [Case(1.0, 15.0)]),
+    "fig12": lambda q: _inflow_table(q, [Case(1.0, 15.0)], ALL),
+    "fig13": lambda q: _sectors_table(q, [c for c in q.slopes() if c.slope_deg not in (0.0, 15.0)]),
+    "fig14a": lambda q: _inflow_table(q, [c for c in q.slopes() if c.slope_deg], ("free_wake",)),
+    "fig14b": lambda q: _inflow_table(q, [c for c in q.slopes() if c.slope_deg], ("vpbfsm",)),
+    "fig15": lambda q: _sectors_table(q, [Case(0.9, 30.0), Case(1.5, 30.0)]),
+    "fig16a": lambda q: _inflow_table(q, [Case(h, 30.0) for h in (0.9, 1.0, 1.5)], ("free_wake",)),
+    "fig16b": lambda q: _inflow_table(q, [Case(h, 30.0) for h in (0.9, 1.0, 1.5)], ("vpbfsm",)),
+}
