@@ -41,12 +41,21 @@ class Branch:
         return self.outcomes[-1]
 
 
-def _secant(outcomes: list[Outcome], parameters: list[float], target: float) -> PyTree:
-    """Linear extrapolation of the last two solutions to `target`."""
+Carry = Callable[[PyTree, float, float], PyTree]
+
+
+def _secant(outcomes: list[Outcome], parameters: list[float], target: float, carry: Carry) -> PyTree:
+    """Linear extrapolation of the last two solutions to `target`, on top of what `carry` knows."""
+    guess = carry(outcomes[-1].x, parameters[-1], target)
     if len(outcomes) < 2:
-        return outcomes[-1].x
+        return guess
     share = (target - parameters[-1]) / (parameters[-1] - parameters[-2])
-    return jax.tree.map(lambda new, old: new + share * (new - old), outcomes[-1].x, outcomes[-2].x)
+    expected = carry(outcomes[-2].x, parameters[-2], parameters[-1])
+    return jax.tree.map(lambda g, new, old: g + share * (new - old), guess, outcomes[-1].x, expected)
+
+
+def _unchanged(x: PyTree, here: float, there: float) -> PyTree:
+    return x
 
 
 def continuation(
@@ -60,6 +69,7 @@ def continuation(
     largest: float | None = None,
     easy: int = 4,
     jump: float = 0.1,
+    carry: Carry = _unchanged,
     progress: bool = False,
 ) -> Branch:
     """Follow x(p) from p = start to stop in steps that adapt to how hard each one was.
@@ -68,7 +78,8 @@ def continuation(
     `newton` to reuse a factorised Jacobian, or ignore it). step, smallest, largest: first, least and greatest step in
     p, by default 1/10, 1/1000 and 1/2 of the way. A step grows by half after at most `easy` iterations and is
     quartered where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and than
-    twice the step it was to correct. Guesses are extrapolated from the last two solutions.
+    twice the step it was to correct. Guesses are extrapolated from the last two solutions; carry(x, p, p') moves a
+    solution from p to p' where its main part is known (a wake with the ground), and only the rest is extrapolated.
 
     Where the step falls below `smallest` the branch ends there, with `reached` False and the last failure kept: a fold
     (see `follow`), or a solver that needs help.
@@ -92,7 +103,7 @@ def continuation(
         left = stop - parameters[-1]
         # A sliver of a last step would only cost a solve: stretch this one over it.
         target = stop if abs(left) <= 1.2 * step else parameters[-1] + float(np.sign(way)) * step
-        guess = _secant(outcomes, parameters, target)
+        guess = _secant(outcomes, parameters, target, carry)
         found = solve(guess, target, outcomes[-1].memory)
         if found.converged and len(outcomes) > 1 and _jumped(found.x, guess, outcomes[-1].x, jump):
             found = replace(found, converged=False, why="the solver jumped to another branch")

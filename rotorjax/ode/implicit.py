@@ -32,7 +32,9 @@ def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int,
         # Wrapped once more: jax's gmres alone starts from zeros_like(b), which transposition takes for an unknown.
         def solve(matrix: Callable, v: Array) -> Array:
             gmres = jax.scipy.sparse.linalg.gmres
-            return gmres(matrix, v, tol=1e-12, restart=min(restart, b.size), maxiter=5, solve_method="batched")[0]
+            found = gmres(matrix, v, tol=1e-11, restart=min(restart, b.size), maxiter=20, solve_method="batched")[0]
+            reached = jnp.linalg.norm(matrix(found) - v) <= 1e-7 * jnp.linalg.norm(v)
+            return jnp.where(reached, found, jnp.nan)
 
         return jax.lax.custom_linear_solve(product, b, solve=solve, transpose_solve=solve)
     factors = jax.scipy.linalg.lu_factor(_materialise(product, b, chunk))
@@ -68,7 +70,7 @@ def attach(
     *args: Any,
     method: Method = "dense",
     chunk: int = CHUNK,
-    restart: int = 200,
+    restart: int = 60,
 ) -> PyTree:
     """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
 
@@ -76,7 +78,8 @@ def attach(
     and vmap. The solution must have converged at these args: what it misses is missing in the derivative too.
 
     method: "dense" makes and factorises the Jacobian once (`chunk` columns at a time) for all directions; "gmres"
-    needs no matrix. Derivatives flow through `args` only, not through arrays that `residual` closes over.
+    needs no matrix, at most 20 cycles of `restart` products, and gives NaN rather than a derivative that it could not
+    solve for. Derivatives flow through `args` only, not through arrays that `residual` closes over.
 
     Raises InputError where `method` is unknown.
     """
@@ -101,7 +104,7 @@ def implicit_orbit(
     *,
     method: Method = "dense",
     chunk: int = CHUNK,
-    restart: int = 200,
+    restart: int = 60,
 ) -> Callable[..., PyTree]:
     """Make x(*args), the solution of residual(x, *args) = 0 that solver(*args) finds, differentiable both ways.
 

@@ -125,3 +125,16 @@ def test_derivative_of_a_free_period():
     np.testing.assert_allclose(found.x[1], series, atol=2 * np.pi * mu**6 / 100)
     slope = jax.grad(lambda m: attach(lambda z, m: residual(z, t0, guess, still, m), found.x, m)[1])(mu)
     np.testing.assert_allclose(slope, 2 * np.pi * (mu / 8 - 5 * mu**3 / 768), atol=mu**5)
+
+
+def test_gmres_says_where_it_fails():
+    """A cyclic shift: no progress before the last Krylov vector (the textbook case for restarts)."""
+
+    def shift(x, p):
+        return jnp.roll(x, 1) - p * jnp.eye(N)[0]
+
+    solution = jnp.eye(N)[-1]
+    whole = jax.jacfwd(lambda p: attach(shift, solution, p, method="gmres"))(1.0)
+    np.testing.assert_allclose(whole, solution, atol=1e-12)
+    cut = jax.jacfwd(lambda p: attach(shift, solution, p, method="gmres", restart=4))(1.0)
+    assert bool(jnp.isnan(cut).all())
