@@ -13,6 +13,8 @@ axis: the velocity there is zero by convention and has no meaningful derivative.
 
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
@@ -146,5 +148,5 @@ def _check_segments(points, strength, core, shape: tuple[int, ...]) -> None:
     for name, value in (("strength", strength), ("core", core)):
         if value.shape != shape:
             raise InputError(f"Argument `{name}` must have one value a segment, {shape}, but is {value.shape}")
-    if not isinstance(core, jax.core.Tracer) and core.size and bool((core < 0).any()):
-        raise InputError(f"Argument `core` {core.shape} must not be negative, but its least value is {core.min()}")
+    if not isinstance(core, Tracer) and np.any(np.asarray(core) < 0):
+        raise InputError(f"Argument `core` {core.shape} must not be negative, but its least value is {np.min(core)}")

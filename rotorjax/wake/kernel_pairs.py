@@ -19,16 +19,21 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-Vector = tuple[Array, Array, Array]
+Vector = tuple[Array, ...] | Array
 
 
 class Pairs(NamedTuple):
-    """Geometry of U segments (rows) against N points (columns), (U, N) each; edge and soft are (U, 1)."""
+    """Geometry of U segments (rows) against N points (columns), (U, N) each; edge and soft are (U, 1).
+
+    i1 and i2 are 1/d₁ and 1/d₂, but 0 on the node, where r̂ := 0 is the mean over directions.
+    """
 
     r1: Vector
     r2: Vector
     d1: Array
     d2: Array
+    i1: Array
+    i2: Array
     edge: Vector
     soft: Array
 
@@ -38,7 +43,7 @@ class Slopes(NamedTuple):
 
     k: Array
     k_e: Array
-    w: Array
+    spread: Array  # 1/W, to divide by
     rho: Array
     kappa1: Array
     kappa2: Array
@@ -69,16 +74,22 @@ def columns(a: Vector) -> Vector:
     return a[0][:, None], a[1][:, None], a[2][:, None]
 
 
-def pairs(points: Vector, start: Vector, end: Vector, soft: Array, chained: bool) -> Pairs:
+def pairs(points: Vector, start: Array, end: Array, soft: Array, chained: bool) -> Pairs:
     """Geometry of all pairs. chained: each segment starts where the last one ended, so a distance serves both."""
     r1, r2 = subtract(points, columns(start)), subtract(points, columns(end))
     if chained:
-        last = tuple(r[-1:] for r in r2)
-        d = jnp.concatenate([jnp.sqrt(dot(r1, r1)), jnp.sqrt(dot(last, last))])
-        d1, d2 = d[:-1], d[1:]
+        d, i = _distance(subtract(points, columns(jnp.concatenate([start, end[:, -1:]], axis=1))))
+        d1, d2, i1, i2 = d[:-1], d[1:], i[:-1], i[1:]
     else:
-        d1, d2 = jnp.sqrt(dot(r1, r1)), jnp.sqrt(dot(r2, r2))
-    return Pairs(r1, r2, d1, d2, columns(subtract(end, start)), soft[:, None])
+        (d1, i1), (d2, i2) = _distance(r1), _distance(r2)
+    return Pairs(r1, r2, d1, d2, i1, i2, columns(subtract(end, start)), soft[:, None])
+
+
+def _distance(r: Vector) -> tuple[Array, Array]:
+    """|r| and 1/|r| (0 where r is 0)."""
+    square = dot(r, r)
+    d = jnp.sqrt(square)
+    return d, d / _nonzero(square)
 
 
 def influence(pair: Pairs, exponent: float) -> Array:
@@ -98,9 +109,8 @@ def influence(pair: Pairs, exponent: float) -> Array:
 
 
 def slopes(pair: Pairs, exponent: float) -> Slopes:
-    """The factors of k'. On a node r̂ := 0, the mean over directions: right for a filament that runs straight on."""
-    r1, r2, edge = pair.r1, pair.r2, pair.edge
-    i1, i2 = pair.d1 / _nonzero(dot(r1, r1)), pair.d2 / _nonzero(dot(r2, r2))
+    """The factors of k'. Divisions come last: XLA computes a quotient once and keeps it for all its readers."""
+    r1, r2, edge, i1, i2 = pair.r1, pair.r2, pair.edge, pair.i1, pair.i2
     c = cross(edge, r1)
     h, q = dot(c, c), dot(r1, r2)
     cos = q * (i1 * i2)
@@ -109,16 +119,17 @@ def slopes(pair: Pairs, exponent: float) -> Slopes:
     bottom = jnp.where(outside, 1 + cos, 1)
     if exponent == 1:
         k = k_h = k_e = top / _nonzero(bottom * (h + pair.soft))
-        w = 1 / _nonzero(h + pair.soft)
+        spread = _nonzero(h + pair.soft)
     else:
         w, slope_h, slope_e = _core(h, pair.soft, exponent)
         m = top / bottom
         k, k_h, k_e = m * w, m * slope_h, m * slope_e
+        spread = 1 / w
     mu1, mu2 = dot(edge, r1), dot(edge, r2)
     difference = i1 - i2
     kappa1 = difference - i1 * i1 * i1 * mu1 + 2 * k_h * mu2
     kappa2 = difference - i2 * i2 * i2 * mu2 + 2 * k_h * mu1
-    return Slopes(k, k_e, w, i1 + i2 - 2 * k_h * q, kappa1, kappa2)
+    return Slopes(k, k_e, spread, i1 + i2 - 2 * k_h * q, kappa1, kappa2)
 
 
 def _core(h: Array, e: Array, n: float) -> tuple[Array, Array, Array]:

@@ -38,7 +38,8 @@ class BiotSavart(VJPHiPrimitive):
 
     def vjp_bwd_retval(self, res, outgrad):
         """Reverse mode, backwards."""
-        return cotangents(self.settings, *res, _dense(outgrad))
+        points, segments = res
+        return cotangents(self.settings, points, segments, _dense(outgrad))
 
     def lin(self, nzs_in, *primals):
         """Linearise: as forward mode, at a kept point."""

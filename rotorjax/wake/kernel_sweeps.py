@@ -5,6 +5,7 @@ of the pairs come out as (U, N) arrays that stay in cache, then the U rows are a
 Written so that XLA's CPU back end makes each of these one vectorised, two-core loop; benchmarks/README.md tells how.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -42,6 +43,7 @@ class Block(NamedTuple):
     soft: Array
 
 
+@partial(jax.jit, static_argnums=0)
 def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     """Velocity (3, N) at points (3, N)."""
     x = tuple(points)
@@ -56,6 +58,7 @@ def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(_rows(segments), settings))[0])
 
 
+@partial(jax.jit, static_argnums=0)
 def velocity_and_tangent(
     settings: Settings, points: Array, segments: Segments, points_t: Array, segments_t: Segments
 ) -> tuple[Array, Array]:
@@ -69,7 +72,7 @@ def velocity_and_tangent(
         r1_t, r2_t = subtract(x_t, columns(block_t.start)), subtract(x_t, columns(block_t.end))
         stretch = dot(columns(block.edge), columns(block_t.edge))
         inner = f.rho * stretch + f.kappa1 * dot(pair.r1, r1_t) - f.kappa2 * dot(pair.r2, r2_t)
-        k, k_t = f.k, (inner - f.k_e * block_t.soft[:, None]) * f.w
+        k, k_t = f.k, (inner - f.k_e * block_t.soft[:, None]) / f.spread
         for u in range(k.shape[0]):
             r, r_t = subtract(x, block.start[:, u]), subtract(x_t, block_t.start[:, u])
             c = cross(block.whirl[:, u], r)
@@ -84,6 +87,7 @@ def velocity_and_tangent(
     return jnp.stack(total), jnp.stack(total_t)
 
 
+@partial(jax.jit, static_argnums=0)
 def cotangents(settings: Settings, points: Array, segments: Segments, weight: Array) -> tuple[Array, Segments]:
     """Derivatives of sum(weight * velocity) with respect to points and segments, in one sweep.
 
@@ -101,7 +105,7 @@ def cotangents(settings: Settings, points: Array, segments: Segments, weight: Ar
         turn, pull = totals
         pair = pairs(p, block.start, block.end, block.soft, settings.chained)
         f = slopes(pair, settings.exponent)
-        a = dot(w, cross(pair.edge, pair.r1)) * f.w
+        a = dot(w, cross(pair.edge, pair.r1)) / f.spread
         kappa1, kappa2 = a * f.kappa1, a * f.kappa2
         for u in range(f.k.shape[0]):
             g, r1, r2 = block.strength[u], subtract(p, block.start[:, u]), subtract(p, block.end[:, u])
