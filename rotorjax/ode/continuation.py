@@ -87,18 +87,12 @@ def continuation(
     Raises InputError where start equals stop or a step is not positive.
     """
     way = stop - start
-    step = abs(way) / 10 if step is None else step
-    smallest = abs(way) / 1000 if smallest is None else smallest
-    largest = abs(way) / 2 if largest is None else largest
-    if way == 0 or min(step, smallest, largest) <= 0:
-        raise InputError(
-            f"Arguments `start` and `stop` must differ and steps be positive, but are {start}, {stop}, {step}"
-        )
+    step, smallest, largest = _lengths((step, smallest, largest), (abs(way) / 10, abs(way) / 1000, abs(way) / 2))
     first = solve(x0, start, None)
     if not first.converged:
         return Branch((), (), False, f"no solution at the start, {start}: {first.why}", failed=first)
     parameters, outcomes, failed = [start], [first], None
-    bar = tqdm(total=abs(way), desc="continuation", disable=not progress)
+    bar, why = tqdm(total=abs(way), desc="continuation", disable=not progress), f"reached {stop:.6g}"
     while parameters[-1] != stop:
         left = stop - parameters[-1]
         # A sliver of a last step would only cost a solve: stretch this one over it.
@@ -115,11 +109,20 @@ def continuation(
             continue
         failed, step = found, min(step, abs(left)) / 4
         if step < smallest:
-            bar.close()
             why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}: step below {smallest:.2g}; {found.why}"
-            return Branch(tuple(parameters), tuple(outcomes), False, why, failed=failed)
+            break
     bar.close()
-    return Branch(tuple(parameters), tuple(outcomes), True, f"reached {stop:.6g}", failed=failed)
+    return Branch(tuple(parameters), tuple(outcomes), parameters[-1] == stop, why, failed=failed)
+
+
+def _lengths(asked: tuple[float | None, ...], usual: tuple[float, ...]) -> list[float]:
+    """First, least and greatest step: those asked for, else the usual ones, all positive."""
+    found = [normal if given is None else given for given, normal in zip(asked, usual, strict=True)]
+    if min(found) <= 0:
+        raise InputError(
+            f"Arguments `step`, `smallest` and `largest` must be positive, and the two ends differ, but are {found}"
+        )
+    return found
 
 
 def _jumped(found: PyTree, guess: PyTree, last: PyTree, jump: float) -> bool:
@@ -171,28 +174,13 @@ def follow(
         flatten(x)
     anchor, z = (_point(*first), _point(*second))
     distance = _distance(z, anchor)
-    if distance == 0:
-        raise InputError("Arguments `first` and `second` must be two different points of the branch, but coincide")
-    step = distance if step is None else step
-    smallest = distance / 1000 if smallest is None else smallest
-    largest = 10 * distance if largest is None else largest
+    step, smallest, largest = _lengths((step, smallest, largest), (distance, distance / 1000, 10 * distance))
     parameters, outcomes, failed = [], [], None
-    on_plane, reached, why = _OnPlane(residual), True, f"followed {points} points"
+    reached, why = True, f"followed {points} points"
     for _ in tqdm(range(points), desc="branch", disable=not progress):
-        length = _distance(z, anchor)
-        tangent = jax.tree.map(lambda new, old, n=length: (new - old) / n, z, anchor)
-        found = None
-        while step >= smallest:
-            guess = jax.tree.map(lambda new, t, s=step: new + s * t, z, tangent)
-            found = newton(on_plane, guess, z, tangent, step, args, **newton_settings)
-            if found.converged:
-                break
-            failed, step = found, step / 4
-        if found is None or not found.converged:
-            reached, why = (
-                False,
-                f"lost after {len(outcomes)} points at {float(z[1]):.6g}: " + (failed.why if failed else ""),
-            )
+        found, step, failed = _correct(_OnPlane(residual), anchor, z, step, smallest, args, newton_settings)
+        if found is None:
+            reached, why = False, f"lost after {len(outcomes)} points at {float(z[1]):.6g}: {failed.why}"
             break
         anchor, z = z, found.x
         parameters.append(float(z[1]))
@@ -202,6 +190,22 @@ def follow(
             why = f"left {between} at {parameters[-1]:.6g}"
             break
     return Branch(tuple(parameters), tuple(outcomes), reached, why, _turns(first[1], second[1], parameters), failed)
+
+
+def _correct(
+    on_plane: _OnPlane, anchor: tuple, z: tuple, step: float, smallest: float, args: tuple, settings: dict
+) -> tuple[Outcome | None, float, Any]:
+    """Next point at arc length `step` from z or less, the step that worked, and the last failure."""
+    length, failed = _distance(z, anchor), None
+    tangent = jax.tree.map(lambda new, old: (new - old) / length, z, anchor)
+    while True:
+        guess = jax.tree.map(lambda new, t, s=step: new + s * t, z, tangent)
+        found = newton(on_plane, guess, z, tangent, step, args, **settings)
+        if found.converged:
+            return found, step, failed
+        failed, step = found, step / 4
+        if step < smallest:
+            return None, step, failed
 
 
 def _point(x: PyTree, parameter: float) -> tuple:

@@ -1,7 +1,6 @@
 """Linear models about a periodic orbit: A(t), B(t), C(t), D(t) by forward mode, a few columns at a time."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -76,13 +75,8 @@ def linearise(
     joint = _Joint(rhs, output, of_state, of_input, tuple(map(int, chosen)))
     flat_x = jax.vmap(lambda x: ravel_pytree(x)[0])(states)
     n, rows = len(x_names), np.concatenate([np.arange(len(x_names)), len(x_names) + kept])
-    whole = np.empty((times.size, rows.size, n + chosen.size), flat_x.dtype)
-    values = np.empty((times.size, kept.size), flat_x.dtype)
-    for k in tqdm(range(times.size), desc="linearise", disable=not progress):
-        z = jnp.concatenate([flat_x[k], flat_u[chosen].astype(flat_x.dtype)])
-        args: tuple[Any, ...] = (times[k], flat_u, p)
-        whole[k] = dense_jacobian(joint, z, *args, chunk=chunk, progress=progress)[rows]
-        values[k] = np.asarray(flat_value(joint, _identity, z, args))[n:][kept]
+    z = jnp.concatenate([flat_x, jnp.tile(flat_u[chosen].astype(flat_x.dtype), (times.size, 1))], axis=1)
+    whole, values = _sweep(joint, z, times, (flat_u, p), rows, chunk, progress)
     names, outs = tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept)
     return PeriodicModel(
         t=np.asarray(times),
@@ -99,8 +93,20 @@ def linearise(
         output_units=units_of(outs, units),
         x=np.asarray(flat_x),
         u=np.asarray(flat_u)[chosen],
-        y=values,
+        y=values[:, n:],
     )
+
+
+def _sweep(
+    joint: _Joint, z: Array, times: Array, args: tuple, rows: np.ndarray, chunk: int, progress: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Chosen rows of the Jacobian and of the value at every time."""
+    whole = np.empty((times.size, rows.size, z.shape[1]), z.dtype)
+    values = np.empty((times.size, rows.size), z.dtype)
+    for k in tqdm(range(times.size), desc="linearise", disable=not progress):
+        whole[k] = dense_jacobian(joint, z[k], times[k], *args, chunk=chunk, progress=progress)[rows]
+        values[k] = np.asarray(flat_value(joint, _identity, z[k], (times[k], *args)))[rows]
+    return whole, values
 
 
 def _identity(x: Array) -> Array:

@@ -27,6 +27,25 @@ def test_reaches_the_end_where_there_is_no_fold():
     np.testing.assert_allclose(branch.last.x, np.roots([1, 0, -3, 1.5]).max(), rtol=1e-10)
 
 
+def test_carry_moves_what_is_known():
+    """x = 100 p + small(p): with the main part carried over there are fewer iterations."""
+
+    def residual(x, p):
+        return x - 100 * p - 0.5 * jnp.sin(x - 99 * p)
+
+    def step(x, p, memory):
+        return newton(residual, x, p, tol=1e-12)
+
+    branch = continuation(step, jnp.full(2, 100.0), 1.0, 3.0, carry=lambda x, here, there: x + 100 * (there - here))
+    plain = continuation(step, jnp.full(2, 100.0), 1.0, 3.0)
+    assert branch.reached
+    carried, bare = (sum(o.iterations for o in b.outcomes) for b in (branch, plain))
+    assert carried < bare
+    p = branch.parameters[-1]
+    rest = np.array(branch.last.x) - 100 * p
+    np.testing.assert_allclose(rest, 0.5 * np.sin(rest + p), atol=1e-8)
+
+
 def test_stops_at_a_fold_and_says_where():
     branch = continuation(lambda x, p, m: newton(cubic, x, p, tol=1e-9), jnp.full(2, 2.5), 8.0, -2.5)
     assert not branch.reached
@@ -75,7 +94,7 @@ def test_bad_input():
     with pytest.raises(InputError, match="differ"):
         continuation(solve, jnp.ones(1), 1.0, 1.0)
     x = jnp.ones(1)
-    with pytest.raises(InputError, match="coincide"):
+    with pytest.raises(InputError, match="the two ends differ"):
         follow(cubic, (x, 1.0), (x, 1.0))
     lost = continuation(lambda x, p, m: newton(lambda x: x**2 + 1, x), x, 0.0, 1.0)
     assert not lost.reached
