@@ -108,8 +108,8 @@ def continuation(
             step = min(step * 1.5, largest) if found.iterations <= easy else step
             continue
         failed, step = found, min(step, abs(left)) / 4
-        if step < smallest:
-            why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}: step below {smallest:.2g}; {found.why}"
+        if step < smallest or found.interrupted:
+            why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}, step {step:.2g}: {found.why}"
             break
     bar.close()
     return Branch(tuple(parameters), tuple(outcomes), parameters[-1] == stop, why, failed=failed)
@@ -204,7 +204,7 @@ def _correct(
         if found.converged:
             return found, step, failed
         failed, step = found, step / 4
-        if step < smallest:
+        if step < smallest or found.interrupted:
             return None, step, failed
 
 

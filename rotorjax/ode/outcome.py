@@ -26,7 +26,7 @@ class Outcome:
 
     x: best iterate found. residual: its measure. residuals: measure of every iterate, the start included. iterations:
     how many were made. converged: whether residual ≤ tol. why: one sentence. wall_time: seconds, compilation included.
-    memory: what a following solve can reuse (a factorised Jacobian), or None.
+    memory: what a following solve can reuse (a factorised Jacobian), or None. interrupted: whether the user ended it.
     """
 
     x: PyTree
@@ -37,6 +37,7 @@ class Outcome:
     why: str
     wall_time: float
     memory: Any = None
+    interrupted: bool = False
 
 
 def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
@@ -92,7 +93,7 @@ class Log:
         """Start the clock; `progress` shows a bar."""
         self.tol, self.limit = tol, max_iterations
         self.residuals: list[float] = []
-        self.best, self.why = float("inf"), ""
+        self.best, self.why, self.interrupted = float("inf"), "", False
         self.best_x: Any = None
         self._bar = tqdm(total=max_iterations, desc=title, disable=not progress)
         self._start = time.perf_counter()
@@ -116,6 +117,7 @@ class Log:
         """Close the bar; swallow a keyboard interrupt once there is something to keep."""
         self._bar.close()
         if kind is KeyboardInterrupt and self.residuals:
+            self.interrupted = True
             self.why = f"interrupted at residual {self.best:.2e}"
             return True
         return False
@@ -127,4 +129,4 @@ class Log:
         why = self.why or f"residual {self.best:.2e} is above {self.tol:.1e} after {made} of {self.limit} iterations"
         spent = time.perf_counter() - self._start
         x = unravel(jnp.asarray(self.best_x))
-        return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, memory)
+        return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, memory, self.interrupted)

@@ -75,6 +75,7 @@ def test_interrupt_keeps_what_it_had():
 
     out = anderson(g, jnp.ones(2), measure=measure, mixing=0.01)
     assert not out.converged
+    assert out.interrupted
     assert "interrupted" in out.why
     assert out.iterations == 1
 

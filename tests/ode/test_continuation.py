@@ -55,6 +55,25 @@ def test_stops_at_a_fold_and_says_where():
     assert not branch.failed.converged
 
 
+def test_an_interrupt_ends_the_branch():
+    """One is enough, though the solver inside keeps it to itself."""
+    calls = []
+
+    def measure(f, x):
+        calls.append(1)
+        if len(calls) == 20:
+            raise KeyboardInterrupt
+        return float(np.abs(f).max())
+
+    branch = continuation(
+        lambda x, p, m: newton(cubic, x, p, tol=1e-12, measure=measure), jnp.full(2, 2.5), 8.0, -1.5, largest=0.3
+    )
+    assert len(calls) == 20
+    assert not branch.reached
+    assert "interrupted" in branch.why
+    assert len(branch.outcomes) > 2
+
+
 def test_factors_are_handed_on():
     seen = []
 
