@@ -74,15 +74,17 @@ def columns(a: Vector) -> Vector:
     return a[0][:, None], a[1][:, None], a[2][:, None]
 
 
-def pairs(points: Vector, start: Array, end: Array, soft: Array, chained: bool) -> Pairs:
-    """Geometry of all pairs. chained: each segment starts where the last one ended, so a distance serves both."""
-    r1, r2 = subtract(points, columns(start)), subtract(points, columns(end))
-    if chained:
-        d, i = _distance(subtract(points, columns(jnp.concatenate([start, end[:, -1:]], axis=1))))
-        d1, d2, i1, i2 = d[:-1], d[1:], i[:-1], i[1:]
-    else:
-        (d1, i1), (d2, i2) = _distance(r1), _distance(r2)
-    return Pairs(r1, r2, d1, d2, i1, i2, columns(subtract(end, start)), soft[:, None])
+def pairs(points: Vector, nodes: Array, soft: Array) -> Pairs:
+    """Geometry of all pairs of N points and U segments, whose starts are the first and ends the last U of the nodes.
+
+    A chain has U + 1 nodes, so that a distance serves the segments on both sides of its node; loose segments have 2U.
+    """
+    count = soft.shape[0]
+    r = subtract(points, columns(nodes))
+    d, i = _distance(r)
+    edge = subtract(nodes[:, -count:], nodes[:, :count])
+    r1, r2 = tuple(x[:count] for x in r), tuple(x[-count:] for x in r)
+    return Pairs(r1, r2, d[:count], d[-count:], i[:count], i[-count:], columns(edge), soft[:, None])
 
 
 def _distance(r: Vector) -> tuple[Array, Array]:

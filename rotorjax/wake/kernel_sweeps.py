@@ -33,11 +33,12 @@ class Settings(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Rows of one step's U segments: ends, edge and strength times edge (3, U); strength and softening (U,)."""
+    """One step's U segments: nodes (3, U + 1) of a chain or (3, 2U); strength times edge (3, U); the rest (U,).
 
-    start: Array
-    end: Array
-    edge: Array
+    The first U nodes are the starts, the last U the ends.
+    """
+
+    nodes: Array
     whirl: Array
     strength: Array
     soft: Array
@@ -49,13 +50,13 @@ def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     x = tuple(points)
 
     def step(total: Vector, block: Block):
-        k = influence(pairs(x, block.start, block.end, block.soft, settings.chained), settings.exponent)
+        k = influence(pairs(x, block.nodes, block.soft), settings.exponent)
         for u in range(k.shape[0]):
-            c = cross(block.whirl[:, u], subtract(x, block.start[:, u]))
+            c = cross(block.whirl[:, u], subtract(x, block.nodes[:, u]))
             total = add(total, _times(k[u], c))
         return total, None
 
-    return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(_rows(segments), settings))[0])
+    return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(segments, settings))[0])
 
 
 @partial(jax.jit, static_argnums=0)
@@ -67,22 +68,24 @@ def velocity_and_tangent(
 
     def step(totals: tuple[Vector, Vector], blocks: tuple[Block, Block]):
         (total, total_t), (block, block_t) = totals, blocks
-        pair = pairs(x, block.start, block.end, block.soft, settings.chained)
+        pair = pairs(x, block.nodes, block.soft)
         f = slopes(pair, settings.exponent)
-        r1_t, r2_t = subtract(x_t, columns(block_t.start)), subtract(x_t, columns(block_t.end))
-        stretch = dot(columns(block.edge), columns(block_t.edge))
-        inner = f.rho * stretch + f.kappa1 * dot(pair.r1, r1_t) - f.kappa2 * dot(pair.r2, r2_t)
-        k, k_t = f.k, (inner - f.k_e * block_t.soft[:, None]) / f.spread
+        pair_t = pairs(x_t, block_t.nodes, block_t.soft)
+        inner = (
+            f.rho * dot(pair.edge, pair_t.edge)
+            + f.kappa1 * dot(pair.r1, pair_t.r1)
+            - f.kappa2 * dot(pair.r2, pair_t.r2)
+        )
+        k, k_t = f.k, (inner - f.k_e * pair_t.soft) / f.spread
         for u in range(k.shape[0]):
-            r, r_t = subtract(x, block.start[:, u]), subtract(x_t, block_t.start[:, u])
+            r, r_t = subtract(x, block.nodes[:, u]), subtract(x_t, block_t.nodes[:, u])
             c = cross(block.whirl[:, u], r)
             c_t = add(cross(block_t.whirl[:, u], r), cross(block.whirl[:, u], r_t))
             total = add(total, _times(k[u], c))
             total_t = add(total_t, add(_times(k_t[u], c), _times(k[u], c_t)))
         return (total, total_t), None
 
-    rows, rows_t = jax.jvp(_rows, (segments,), (segments_t,))
-    both = _blocks(rows, settings), _blocks(rows_t, settings)
+    both = jax.jvp(lambda s: _blocks(s, settings), (segments,), (segments_t,))
     total, total_t = jax.lax.scan(step, (_zeros(points), _zeros(points)), both)[0]
     return jnp.stack(total), jnp.stack(total_t)
 
@@ -103,18 +106,19 @@ def cotangents(settings: Settings, points: Array, segments: Segments, weight: Ar
 
     def step(totals: tuple[Vector, Vector], block: Block):
         turn, pull = totals
-        pair = pairs(p, block.start, block.end, block.soft, settings.chained)
+        pair = pairs(p, block.nodes, block.soft)
         f = slopes(pair, settings.exponent)
         a = dot(w, cross(pair.edge, pair.r1)) / f.spread
         kappa1, kappa2 = a * f.kappa1, a * f.kappa2
-        for u in range(f.k.shape[0]):
-            g, r1, r2 = block.strength[u], subtract(p, block.start[:, u]), subtract(p, block.end[:, u])
+        count = f.k.shape[0]
+        for u in range(count):
+            g, r1, r2 = block.strength[u], subtract(p, block.nodes[:, u]), subtract(p, block.nodes[:, u - count])
             turn = add(turn, _times(f.k[u], tuple(block.whirl[:, u])))
             pull = add(pull, subtract(_times(kappa1[u], _times(g, r1)), _times(kappa2[u], _times(g, r2))))
         sums = kappa1 @ moments, kappa2 @ moments, f.k @ swirls, (a * f.rho) @ one, (a * f.k_e) @ one
         return (turn, pull), sums
 
-    blocks = _blocks(_rows(segments), settings)
+    blocks = _blocks(segments, settings)
     (turn, pull), sums = jax.lax.scan(step, (_zeros(points), _zeros(points)), blocks)
     sums = [s.reshape(-1, *s.shape[2:])[: segments.strength.shape[0]].T for s in sums]
     return jnp.stack(add(pull, cross(w, turn))), _gather(segments, centre, *sums)
@@ -130,27 +134,24 @@ def _gather(segments: Segments, centre: Array, first: Array, second: Array, swir
     return Segments(jnp.stack(at_start), jnp.stack(at_end), dot(edge, r1_w), -g * k_e)
 
 
-def _rows(segments: Segments) -> Block:
-    """What every step needs of the segments."""
-    edge = segments.end - segments.start
-    return Block(segments.start, segments.end, edge, segments.strength * edge, segments.strength, segments.soft)
-
-
-def _blocks(rows: Block, settings: Settings) -> Block:
+def _blocks(segments: Segments, settings: Settings) -> Block:
     """Cut S segments into steps of U, (steps, …, U); the last step is filled up with segments of no length or strength.
 
     They stand where the last segment ends, which keeps a chain a chain.
     """
-    steps = -(-rows.strength.shape[0] // settings.block)
-    missing = steps * settings.block - rows.strength.shape[0]
-    last = rows.end[:, -1:]
-    fill = Block(last, last, 0 * last, 0 * last, 0 * rows.strength[-1:], rows.soft[-1:])
+    width = settings.block
+    steps = -(-segments.strength.shape[0] // width)
+    missing = steps * width - segments.strength.shape[0]
 
     def cut(row: Array, filler: Array) -> Array:
         full = jnp.concatenate([row, jnp.repeat(filler, missing, axis=-1)], axis=-1)
-        return jnp.moveaxis(full.reshape(*row.shape[:-1], steps, settings.block), -2, 0)
+        return jnp.moveaxis(full.reshape(*row.shape[:-1], steps, width), -2, 0)
 
-    return Block(*map(cut, rows, fill))
+    last = segments.end[:, -1:]
+    start, end = cut(segments.start, last), cut(segments.end, last)
+    strength, soft = cut(segments.strength, 0 * segments.strength[-1:]), cut(segments.soft, segments.soft[-1:])
+    nodes = jnp.concatenate([start, end[..., -1:] if settings.chained else end], axis=-1)
+    return Block(nodes, strength[:, None] * (end - start), strength, soft)
 
 
 def _times(scale: Array, vector: Vector) -> Vector:

@@ -1,0 +1,74 @@
+"""The wake as a first-order system: Eqs. 12–13 and 15 in the blades' frames."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.rotor.blade_element import SectionLoads, section_loads
+from rotorjax.wake.field import node_velocities
+from rotorjax.wake.model import FreeWake, WakeState
+from rotorjax.wake.segments import releases
+from rotorjax.wake.transport import AgeOperator, age_operator
+
+
+class WakeInputs(NamedTuple):
+    """What drives the wake. collective: θ₀ (rad)."""
+
+    collective: Float[Array, ""]
+
+
+def inputs_of(model: FreeWake) -> WakeInputs:
+    """The operating point's own inputs."""
+    return WakeInputs(model.operating.collective)
+
+
+def operators(model: FreeWake) -> tuple[AgeOperator, AgeOperator]:
+    """Age differences of the near wake and of the far filaments."""
+    settings = model.settings
+    return age_operator(settings.near_ages, settings.age_step), age_operator(settings.far_ages, settings.age_step)
+
+
+def blade_loads(model: FreeWake, control: Float[Array, "K R 3"], inputs: WakeInputs) -> SectionLoads:
+    """Section loads (K, R) from the air's velocity at the control points, in the blades' frames."""
+    return section_loads(
+        model.rotor,
+        model.operating,
+        model.stations,
+        model.stations - control[..., 1],
+        -control[..., 2],
+        collective=inputs.collective,
+    )
+
+
+def rhs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, model: FreeWake) -> WakeState:
+    """Rate of change of the state per radian of azimuth, with slice 0 at azimuth psi.
+
+    state: K = B slices (all blades at this instant), or K = 1 where the wake is axisymmetric. inputs: collective (rad).
+    """
+    v = node_velocities(model, state, psi)
+    near, far = operators(model)
+    start = jax.vmap(lambda s: releases(model, s))(state)
+    wanted = blade_loads(model, v.control, inputs).circulation
+    leading = jnp.broadcast_to(model.leading, (*state.near.shape[:2], 3))
+    return WakeState(
+        near=v.near - _drift(near, state.near, leading),
+        far=v.far - _drift(far, state.far, start.points),
+        gamma_near=-_age_slope(near, state.gamma_near, state.gamma_bound),
+        gamma_far=-_age_slope(far, state.gamma_far, start.strength),
+        gamma_bound=(wanted - state.gamma_bound) / model.settings.circulation_lag,
+    )
+
+
+def _drift(operator: AgeOperator, nodes: Float[Array, "K F A 3"], inlet: Float[Array, "K F 3"]):
+    """∂ρ/∂ζ + ẑ × ρ: transport towards greater age, seen from the turning blade."""
+    along = (
+        jnp.einsum("ij,kfjc->kfic", jnp.asarray(operator.matrix), nodes) + operator.inlet[:, None] * inlet[:, :, None]
+    )
+    turning = jnp.stack([-nodes[..., 1], nodes[..., 0], jnp.zeros_like(nodes[..., 0])], axis=-1)
+    return along + turning
+
+
+def _age_slope(operator: AgeOperator, gamma: Float[Array, "K F A"], inlet: Float[Array, "K F"]):
+    return jnp.einsum("ij,kfj->kfi", jnp.asarray(operator.matrix), gamma) + operator.inlet * inlet[..., None]

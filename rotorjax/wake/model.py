@@ -1,0 +1,135 @@
+"""The free-wake model and its state, and the blade's lifting line.
+
+Everything is in rotor units: lengths over R, velocities over ΩR, circulation over ΩR², time as azimuth ψ (rad).
+
+A wake is kept as K slices. Slice k belongs to a blade at azimuth ψ_k = ψ + 2πk/K and is written in that blade's own
+frame: x outboard along the blade, y in the direction of rotation, z up. One layout serves three uses:
+    K = 1           an axisymmetric wake: every blade's wake is the same, turned (hover, level ground);
+    K = B           the instantaneous wake of all B blades: the state that is marched in time;
+    K = any multiple of B   a periodic wake, sampled over one revolution: slices k, k + K/B, k + 2K/B … are the wakes
+                    of the B blades at one instant.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor import geometry
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.wake.settings import WakeSettings, wake_settings
+
+
+class WakeState(eqx.Module):
+    """The wake's part x_W of the state (Eq. 15).
+
+    near: r_NW (K, R+1, A_N, 3), nodes of the near-wake lattice, the blade's own edge excluded.
+    far: r_TV (K, F, A_F, 3), nodes of the far filaments, their release points excluded; filament 0 is the tip vortex.
+    gamma_near: Γ_NW (K, R, A_N), ring strengths at the lattice's ages. gamma_far: Γ_TV (K, F, A_F).
+    gamma_bound: Γ_b (K, R), filtered bound circulation.
+    """
+
+    near: Float[Array, "K R1 AN 3"]
+    far: Float[Array, "K F AF 3"]
+    gamma_near: Float[Array, "K R AN"]
+    gamma_far: Float[Array, "K F AF"]
+    gamma_bound: Float[Array, "K R"]
+
+
+class FreeWake(eqx.Module):
+    """Parameters of the free wake: rotor, operating point, ground and settings, all leaves differentiable.
+
+    washout: velocity (over ΩR) of an auxiliary flow that carries the wake away, 0 in every physical case; the solver
+    starts with it and takes it back (solution.py).
+    """
+
+    rotor: Rotor
+    operating: OperatingPoint
+    ground: Plane | None
+    settings: WakeSettings
+    washout: Float[Array, ""]
+
+    @property
+    def edges(self) -> Float[Array, " R+1"]:
+        """Panel edges on the blade, over R: cosine-spaced, so that panels narrow towards root and tip."""
+        theta = np.linspace(0, np.pi, self.settings.panels + 1)
+        return _stretch(self.rotor.root_cutout, theta)
+
+    @property
+    def stations(self) -> Float[Array, " R"]:
+        """Control points, over R: at the middle of each panel in the cosine's angle (exact for elliptic loading)."""
+        theta = np.linspace(0, np.pi, self.settings.panels + 1)
+        return _stretch(self.rotor.root_cutout, 0.5 * (theta[1:] + theta[:-1]))
+
+    @property
+    def widths(self) -> Float[Array, " R"]:
+        """Panel widths, over R."""
+        return jnp.diff(self.edges)
+
+    @property
+    def leading(self) -> Float[Array, "R+1 3"]:
+        """Nodes of the lifting line, a straight line along the blade axis.
+
+        The swept tip is kept in the geometry (`geometry.sweep_offset`) but the lifting line stays straight: a kink in
+        it would see its own logarithmic singularity.
+        """
+        return along_blade(self.edges)
+
+    @property
+    def chords(self) -> Float[Array, " R"]:
+        """Chord at the control points, over R."""
+        return geometry.chord(self.rotor, self.stations)
+
+    @property
+    def climb(self) -> Float[Array, ""]:
+        """Climb velocity over ΩR."""
+        return self.operating.climb_ratio(self.rotor.radius)
+
+    @property
+    def viscosity(self) -> Float[Array, ""]:
+        """Kinematic viscosity over ΩR²."""
+        return self.operating.viscosity / (self.operating.omega * self.rotor.radius**2)
+
+
+def free_wake(
+    rotor: Rotor, operating: OperatingPoint, ground: Plane | None = None, settings: WakeSettings | None = None
+) -> FreeWake:
+    """Make the model of a rotor's free wake, in or out of ground effect.
+
+    Raises InputError where the rotor climbs over ground, or azimuths is no multiple of the number of blades.
+    """
+    settings = wake_settings() if settings is None else settings
+    if ground is not None and float(operating.climb) != 0:
+        raise InputError(
+            f"Argument `operating` must not climb over ground (a steady state needs a fixed height), "
+            f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
+        )
+    if settings.azimuths % rotor.blades:
+        raise InputError(
+            f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
+            f"but has {settings.azimuths}"
+        )
+    return FreeWake(rotor, operating, ground, settings, jnp.zeros(()))
+
+
+def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:
+    """Points on the blade's axis at r, in the blade's frame."""
+    return jnp.stack([r, jnp.zeros_like(r), jnp.zeros_like(r)], axis=-1)
+
+
+def slices(state: WakeState) -> int:
+    """K, the number of slices of a state."""
+    return state.near.shape[0]
+
+
+def azimuths(state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Float[Array, " K"]:
+    """ψ_k of each slice (rad) when slice 0 stands at psi."""
+    k = slices(state)
+    return psi + 2 * jnp.pi / k * jnp.arange(k)
+
+
+def _stretch(inner, theta):
+    return inner + (1 - inner) * 0.5 * (1 - jnp.cos(jnp.asarray(theta)))

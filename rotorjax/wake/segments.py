@@ -1,0 +1,76 @@
+"""A wake slice as straight vortex segments: near-wake lattice, far filaments, bound vortex."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.wake.far_wake import closure, cores, fading
+from rotorjax.wake.model import FreeWake, WakeState
+from rotorjax.wake.roll_up import Release, release, trailers
+
+
+class Segments(NamedTuple):
+    """Straight segments: start, end (S, 3) over R, strength (S,) over ΩR² from start to end, core (S,) over R."""
+
+    start: Float[Array, "S 3"]
+    end: Float[Array, "S 3"]
+    strength: Float[Array, " S"]
+    core: Float[Array, " S"]
+
+
+def join(*parts: Segments) -> Segments:
+    """Put segments one behind the other."""
+    return Segments(*(jnp.concatenate(field) for field in zip(*parts, strict=True)))
+
+
+def near_lattice(model: FreeWake, state: WakeState, core: Float[Array, ""]) -> Segments:
+    """Near wake of one slice (fields without their K axis): trailed and shed vorticity, every edge once.
+
+    Ring strengths live at nodes; the ring between two ages carries their mean. The spanwise edge at the blade belongs
+    to the bound vortex; that of the last row is where the far filaments take over.
+    """
+    nodes = lattice_nodes(model, state.near)
+    gamma = jnp.concatenate([state.gamma_bound[:, None], state.gamma_near], axis=1)
+    rings = 0.5 * (gamma[:, 1:] + gamma[:, :-1])
+    trailed = _segments(nodes[:, :-1], nodes[:, 1:], trailers(rings), core)
+    shed = _segments(nodes[:-1, 1:-1], nodes[1:, 1:-1], jnp.diff(rings, axis=1), core)
+    return join(trailed, shed)
+
+
+def lattice_nodes(model: FreeWake, near: Float[Array, "R+1 AN 3"]) -> Float[Array, "R+1 A 3"]:
+    """All nodes of a slice's lattice, the lifting line first."""
+    return jnp.concatenate([model.leading[:, None], near], axis=1)
+
+
+def releases(model: FreeWake, state: WakeState) -> Release:
+    """Start of the far filaments of one slice."""
+    return release(model, state.near[:, -1], state.gamma_near[:, -1])
+
+
+def far_filaments(model: FreeWake, state: WakeState, start: Release, psi: Float[Array, ""]) -> Segments:
+    """Far filaments of one slice at azimuth psi, with their closure, fading and cores."""
+    nodes = jnp.concatenate([start.points[:, None], state.far], axis=1)
+    gamma = jnp.concatenate([start.strength[:, None], state.gamma_far], axis=1)
+    strength = 0.5 * (gamma[:, 1:] + gamma[:, :-1])
+    if model.settings.closure_turns:
+        nodes = jnp.concatenate([nodes, closure(model, nodes, psi)], axis=1)
+        more = nodes.shape[1] - 1 - strength.shape[1]
+        strength = jnp.concatenate([strength, jnp.repeat(strength[:, -1:], more, axis=1)], axis=1)
+    return Segments(
+        nodes[:, :-1].reshape(-1, 3),
+        nodes[:, 1:].reshape(-1, 3),
+        (strength * fading(model)).ravel(),
+        cores(model, start.strength[0]).ravel(),
+    )
+
+
+def bound_vortex(model: FreeWake, gamma: Float[Array, " R"]) -> Segments:
+    """Lifting line of one slice, with a core of about half a chord (it stands for a blade, not for a line)."""
+    core = model.settings.bound_core_chords * model.chords
+    return Segments(model.leading[:-1], model.leading[1:], gamma, core)
+
+
+def _segments(start, end, strength, core) -> Segments:
+    strength = strength.ravel()
+    return Segments(start.reshape(-1, 3), end.reshape(-1, 3), strength, jnp.broadcast_to(core, strength.shape))

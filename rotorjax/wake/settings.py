@@ -1,0 +1,182 @@
+"""How a free wake is discretised and closed: one frozen object, each choice with its reason."""
+
+from typing import Literal, get_args
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.rotor.checks import check_number
+
+RollUp = Literal["impulse", "maximum", "centroid", "paper"]
+
+
+class WakeSettings(eqx.Module):
+    """Settings of the free wake; make them with `wake_settings`, which checks them.
+
+    Static (they fix array shapes):
+        panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip.
+        age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
+            are free to move; closure_turns: further turns that repeat the last free one (far_wake.py).
+        azimuths: K, slices of the periodic wake where it is not axisymmetric (a multiple of the number of blades).
+        inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
+            does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
+        roll_up: strength of the tip vortex and where it leaves the last row of the near wake (roll_up.py).
+            "impulse": at `release`, as strong as conserves circulation and impulse with a single inboard filament;
+            "maximum": at `release`, the smooth maximum of the bound circulation; "centroid": that strength, at the
+            circulation-weighted centroid of what it gathers; "paper": that strength, at the last outboard node
+            (text below Eq. 13), to be used with `inboard=()`.
+
+    Arrays (differentiable; lengths over R):
+        release: span station of the tip vortex's release. sharpness: exponent of the smooth maximum that measures the
+            tip vortex's strength (∞ is the paper's maximum, whose argmax has no derivative).
+        tip_core, turbulence: r₀ and a₁ of Eq. 16 (Bhagwat & Leishman 2002; a₁ between 5e-5 and 4e-4 is in use).
+        inboard_core: least core of the inboard filaments, each the whole inner vortex sheet gathered into one line.
+        near_core: core of the lattice in the velocity of wake nodes, about the distance a node travels over its
+            neighbour's sheet; the blade's own control points see control_core instead, small against a panel, so
+            that circulation falls to zero at the tip.
+        bound_core_chords: core of the bound vortex in the velocity of wake nodes, over the chord. A lifting line is
+            singular where a blade has a chord; without it the passing tip vortex is thrown up and the hover branch
+            folds at a climb of 0.01 ΩR.
+        self_induction_core: core radius in the local self-induction of a curved tip vortex, which straight segments
+            lose (field.py).
+        inboard_decay: rate per turn at which the inboard filaments lose strength: vorticity of both signs that lies
+            side by side in the inner sheet diffuses and cancels, the tip vortex's does not.
+        taper_turns: turns over which all strengths fade at the very end, so that the cut end induces nothing abrupt.
+        circulation_lag: time constant (rad) of the filter between blade-element and bound circulation.
+    """
+
+    panels: int = eqx.field(static=True)
+    age_step_deg: float = eqx.field(static=True)
+    near_wake_deg: float = eqx.field(static=True)
+    free_turns: float = eqx.field(static=True)
+    closure_turns: int = eqx.field(static=True)
+    azimuths: int = eqx.field(static=True)
+    inboard: tuple[float, ...] = eqx.field(static=True)
+    roll_up: RollUp = eqx.field(static=True)
+    release: Float[Array, ""]
+    sharpness: Float[Array, ""]
+    tip_core: Float[Array, ""]
+    turbulence: Float[Array, ""]
+    inboard_core: Float[Array, ""]
+    near_core: Float[Array, ""]
+    control_core: Float[Array, ""]
+    bound_core_chords: Float[Array, ""]
+    self_induction_core: Float[Array, ""]
+    inboard_decay: Float[Array, ""]
+    taper_turns: Float[Array, ""]
+    circulation_lag: Float[Array, ""]
+
+    @property
+    def age_step(self) -> float:
+        """Δζ in rad."""
+        return float(np.deg2rad(self.age_step_deg))
+
+    @property
+    def near_ages(self) -> int:
+        """Ages of the near wake, the blade excluded."""
+        return round(self.near_wake_deg / self.age_step_deg)
+
+    @property
+    def far_ages(self) -> int:
+        """Ages of the free part of the far filaments, the release point excluded."""
+        return round(self.free_turns * self.steps_per_turn)
+
+    @property
+    def steps_per_turn(self) -> int:
+        """Age steps in one turn."""
+        return round(360 / self.age_step_deg)
+
+    @property
+    def filaments(self) -> int:
+        """F, far filaments a blade: the tip vortex first, then the inboard ones."""
+        return 1 + len(self.inboard)
+
+
+def wake_settings(
+    panels: int = 14,
+    age_step_deg: float = 15.0,
+    near_wake_deg: float = 90.0,
+    free_turns: float = 4.0,
+    closure_turns: int = 4,
+    azimuths: int = 12,
+    inboard: tuple[float, ...] = (0.45,),
+    roll_up: RollUp = "impulse",
+    release: float = 0.975,
+    sharpness: float = 20.0,
+    tip_core: float = 0.03,
+    turbulence: float = 2e-4,
+    inboard_core: float = 0.12,
+    near_core: float = 0.03,
+    control_core: float = 0.002,
+    bound_core_chords: float = 0.55,
+    self_induction_core: float = 0.01,
+    inboard_decay: float = 0.6,
+    taper_turns: float = 1.5,
+    circulation_lag: float = 0.1,
+) -> WakeSettings:
+    """Make settings from plain numbers; the defaults suit hover in and out of ground effect.
+
+    Raises InputError where a count, an angle or a length is out of range.
+    """
+    for name, value, least in (
+        ("panels", panels, 4),
+        ("closure_turns", closure_turns, 0),
+        ("azimuths", azimuths, 1),
+    ):
+        if value < least or value != int(value):
+            raise InputError(f"Argument `{name}` must be a whole number of at least {least}, but is {value}")
+    steps = 360 / age_step_deg if age_step_deg > 0 else 0.5
+    if abs(steps - round(steps)) > 1e-9 or steps < 12:
+        raise InputError(
+            f"Argument `age_step_deg` must divide 360 and be at most 30, but is {age_step_deg}: try 7.5, 10, 15 or 20"
+        )
+    for name, value in (("near_wake_deg", near_wake_deg), ("free_turns", free_turns * 360)):
+        ages = value / age_step_deg
+        if abs(ages - round(ages)) > 1e-9 or ages < 4:
+            raise InputError(
+                f"Argument `{name}` must be a whole number of age steps ({age_step_deg} deg), at least four, "
+                f"but is {ages:.3g} of them"
+            )
+    if closure_turns and free_turns < 2:
+        raise InputError(
+            f"Argument `free_turns` must be at least 2 where closure_turns > 0 (it repeats the last turn), "
+            f"but is {free_turns}"
+        )
+    if roll_up not in get_args(RollUp):
+        raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {roll_up!r}")
+    if roll_up == "impulse" and len(inboard) != 1:
+        raise InputError(
+            f"Argument `inboard` must hold one station for roll_up 'impulse', but is {inboard}: "
+            "use 'maximum' or 'centroid'"
+        )
+    if any(not 0 < r < 1 for r in inboard) or list(inboard) != sorted(set(inboard)):
+        raise InputError(f"Argument `inboard` must hold rising span stations between 0 and 1, but is {inboard}")
+    check_number("release", release, 0.0, 1.0)
+    positive = {"sharpness": sharpness, "tip_core": tip_core, "inboard_core": inboard_core, "near_core": near_core}
+    positive |= {"control_core": control_core, "bound_core_chords": bound_core_chords, "taper_turns": taper_turns}
+    positive |= {"self_induction_core": self_induction_core, "circulation_lag": circulation_lag}
+    for name, value in positive.items():
+        check_number(name, value, 0.0, open_=True)
+    for name, value in (("turbulence", turbulence), ("inboard_decay", inboard_decay)):
+        check_number(name, value, 0.0)
+    arrays = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, bound_core_chords)
+    arrays += (self_induction_core, inboard_decay, taper_turns, circulation_lag)
+    return WakeSettings(
+        panels,
+        age_step_deg,
+        near_wake_deg,
+        free_turns,
+        closure_turns,
+        azimuths,
+        tuple(inboard),
+        roll_up,
+        *(jnp.asarray(v, float) for v in arrays),
+    )
+
+
+def quick_settings(**overrides) -> WakeSettings:
+    """Coarser settings for a first look: fewer panels, turns and azimuths."""
+    return wake_settings(**{"panels": 10, "free_turns": 3.0, "closure_turns": 3, "azimuths": 8} | overrides)
