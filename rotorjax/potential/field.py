@@ -132,13 +132,16 @@ def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Arr
     above = pressure_functions(modes, _mirrored(points))
     if modes.parity == "even":
         return above
-    return jnp.where(points[..., 2] >= 0, above, 2 * disk_functions(modes, points[..., 0], points[..., 1]) - above)
+    odd = 2 * disk_functions(modes, points[..., 0], points[..., 1]) - above
+    below = jnp.where(modes.odd.reshape((-1,) + (1,) * (points.ndim - 1)), odd, above)
+    return jnp.where(points[..., 2] >= 0, above, below)
 
 
 def field_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
     """Return the velocity (hub frame) of each mode's unit state at any hub-frame points."""
     above = velocity_functions(modes, _mirrored(points))[:2]
-    if modes.parity == "even":
+    if modes.parity != "odd":
         disk = velocity_functions(modes, points * jnp.array([1, 1, 0], points.dtype))[:2]
-        above = jnp.where(points[..., 2] >= 0, above, 2 * disk - above)
+        same = modes.odd.reshape((-1,) + (1,) * (points.ndim - 1)) | (points[..., 2] >= 0)
+        above = jnp.where(same, above, 2 * disk - above)
     return jnp.concatenate([above, -axial_functions(modes, points)[None]])

@@ -24,12 +24,14 @@ def azimuthal(modes: ModeTable, psi: Float[Array, "*N"]) -> Float[Array, "M ..."
 def shaping(modes: ModeTable, r: Float[Array, "*N"]) -> Float[Array, "M ..."]:
     """Return the radial shaping functions Ψ_n^m(r̄) = P̄_n^m(ν)/ν of Eq. 2 at radii r (over R), He's φ_n^m (He 1989).
 
-    They are polynomials in r̄, finite at the disk edge. InputError where n + m is even: no load.
+    They are polynomials in r̄, finite at the disk edge. Even modes of a table
+    of both parities carry no load: zero. Raises InputError where all are even.
     """
-    if modes.parity != "odd":
+    if modes.parity == "even":
         raise InputError("Argument `modes` must have n + m odd to carry a load, but has n + m even")
     power = jnp.stack([r**m if m else jnp.ones_like(r) for m, _ in modes.pairs])
-    return (power * reduced_legendre_p(modes.pairs, 1 - r * r))[modes.pair_index]
+    rows = (power * reduced_legendre_p(modes.pairs, 1 - r * r))[modes.pair_index]
+    return jnp.where(modes.odd.reshape((-1,) + (1,) * r.ndim), rows, 0.0)
 
 
 def _share(modes: ModeTable) -> Float[Array, " M"]:

@@ -66,12 +66,14 @@ def finite_state_model(
     p: float = 2.0,
     mass_flow: MassFlow = "paper",
     ground_parity: Literal["even", "odd"] = "even",
+    even_terms: int = 0,
     quadrature: DiskQuadrature | None = None,
 ) -> FiniteStateModel:
     """Make the model; its defaults are the paper's for level ground (τ₁, τ₃, τ₅; b^{η^p} with π/7 and 2).
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
-    terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only). Raises
+    terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only); even_terms: see
+    `modes.rotor_modes`, for dynamics. Raises
     InputError where a count, b, p, mass_flow or ground_parity is not allowed.
     """
     if mass_flow not in get_args(MassFlow):
@@ -83,7 +85,7 @@ def finite_state_model(
     if quadrature.nodes_psi < least:
         raise InputError(f"Argument `quadrature` must have at least {least} nodes in ψ, but has {quadrature.nodes_psi}")
     return FiniteStateModel(
-        rotor_modes(harmonics, radial_terms),
+        rotor_modes(harmonics, radial_terms, even_terms),
         ground_modes(ground_harmonics, ground_radial_terms, ground_parity),
         ground,
         correction(b, p),

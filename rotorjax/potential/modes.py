@@ -11,6 +11,9 @@ from rotorjax.errors import InputError
 HIGHEST_DEGREE = 15  # up to here the Legendre functions are proved to 1e-12
 
 
+Parity = Literal["odd", "even", "both"]
+
+
 class Mode(NamedTuple):
     """One term of the expansion: harmonic m, degree n, and "cos" or "sin"."""
 
@@ -20,16 +23,16 @@ class Mode(NamedTuple):
 
 
 class ModeTable(eqx.Module):
-    """M modes of one parity, all static.
+    """M modes, all static.
 
-    modes: tuple of M `Mode`; parity: "odd" where n + m is odd (pressure jump, the rotor), "even" where it is even (mass
-    source, the ground).
+    modes: tuple of M `Mode`; parity: "odd" where every n + m is odd (pressure jump, the rotor), "even" where it is even
+    (mass source, the ground), "both" where a dynamic rotor has even states beside its odd ones.
     """
 
     modes: tuple[Mode, ...] = eqx.field(static=True)
-    parity: Literal["odd", "even"] = eqx.field(static=True)
+    parity: Parity = eqx.field(static=True)
 
-    def __init__(self, modes: Iterable[Mode], parity: Literal["odd", "even"]):
+    def __init__(self, modes: Iterable[Mode], parity: Parity):
         """Check the modes and freeze them.
 
         Raises InputError where a mode has the wrong parity, n < m, a sine at m = 0, or a degree above 15.
@@ -42,7 +45,7 @@ class ModeTable(eqx.Module):
             m, n, kind = mode
             if not 0 <= m <= n <= HIGHEST_DEGREE:
                 raise InputError(f"Argument `modes` must keep 0 <= m <= n <= {HIGHEST_DEGREE}, but has {mode}")
-            if (n + m) % 2 != (parity == "odd"):
+            if parity != "both" and (n + m) % 2 != (parity == "odd"):
                 raise InputError(f"Argument `modes` must have n + m {parity}, but has {mode}")
             if kind not in (("cos",) if m == 0 else ("cos", "sin")):
                 raise InputError(f"Argument `modes` must be cosine, or sine with m > 0, but has {mode}")
@@ -73,6 +76,11 @@ class ModeTable(eqx.Module):
     def n(self) -> np.ndarray:
         """Degrees, (M,)."""
         return np.array([mode.n for mode in self.modes])
+
+    @property
+    def odd(self) -> np.ndarray:
+        """Whether n + m is odd, (M,): the modes that carry load."""
+        return (self.m + self.n) % 2 == 1
 
     @property
     def diagonal(self) -> np.ndarray:
@@ -112,9 +120,16 @@ def mode_table(first_degree: int, harmonics: int, radial_terms: int) -> ModeTabl
     return ModeTable(modes, "odd" if first_degree % 2 else "even")
 
 
-def rotor_modes(harmonics: int = 0, radial_terms: int = 3) -> ModeTable:
-    """Make the rotor's table, n = m+1, m+3, … (Eq. 5); the default is the paper's τ₁, τ₃, τ₅."""
-    return mode_table(1, harmonics, radial_terms)
+def rotor_modes(harmonics: int = 0, radial_terms: int = 3, even_terms: int = 0) -> ModeTable:
+    """Make the rotor's table, n = m+1, m+3, … (Eq. 5); the default is the paper's τ₁, τ₃, τ₅.
+
+    even_terms: how many n = m+2, m+4, … to add for each harmonic. They carry no load and vanish in steady flow; in
+    unsteady flow the odd functions alone are not complete (Morillo and Peters 2002).
+    """
+    odd = mode_table(1, harmonics, radial_terms)
+    if even_terms == 0:
+        return odd
+    return ModeTable(odd.modes + mode_table(2, harmonics, even_terms).modes, "both")
 
 
 def ground_modes(harmonics: int = 0, radial_terms: int = 5, parity: Literal["even", "odd"] = "even") -> ModeTable:

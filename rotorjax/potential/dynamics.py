@@ -1,0 +1,165 @@
+"""The dynamic rotor: [M]å + [D][V][L]⁻¹[M]a = [D]τ forward in time, and its costates backward (Eq. 1).
+
+Time is azimuth (rad), so a dot is d/dψ. Mass flow: V_T = √(μ² + λ²) for a_1^0 and V̄ = (μ² + λ(λ + λ_i))/V_T for the
+others, λ = λ_climb + λ_i, λ_i = (2/√3)[L⁻¹Ma]_1; in hover V and 2V, as in Eq. 4. "linear" takes V_T for all.
+
+With odd modes only, the field of an acceleration is the nearest that the odd functions offer; even modes
+(`even_terms` of the model) complete them, and the flow converges to the exact linear one at every frequency.
+
+The costates Δ obey the same equation with −[M]Δ̇: forward in time they grow, so they are marched backward from the end
+of a window, where they start from their steady value; the start is forgotten after the transit time of the wake.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.potential.field import pressure_functions
+from rotorjax.potential.ground_source import correlation
+from rotorjax.potential.matrices import apparent_mass, damping, influence
+from rotorjax.potential.model import FiniteState, FiniteStateModel
+
+
+class RotorInputs(eqx.Module):
+    """Inputs at one instant, or over T instants with a leading axis T on every field.
+
+    tau (M,): pressure coefficients; mu (): advance ratio, the wind blowing aft; climb (): climb speed; both over ΩR.
+    """
+
+    tau: Float[Array, "*T M"]
+    mu: Float[Array, "*T"]
+    climb: Float[Array, "*T"]
+
+
+def hover_inputs(tau: Float[Array, "*T M"]) -> RotorInputs:
+    """Make the inputs of a hovering rotor."""
+    zero = jnp.zeros(tau.shape[:-1], tau.dtype)
+    return RotorInputs(tau, zero, zero)
+
+
+def _total_speed(mu: Float[Array, ""], through: Float[Array, ""]) -> Float[Array, ""]:
+    """V_T; zero with zero derivative at rest, where the root has none."""
+    rest = (mu == 0) & (through == 0)
+    return jnp.where(rest, 0.0, jnp.sqrt(jnp.where(rest, 1.0, mu * mu + through * through)))
+
+
+def mean_induced_inflow(a: Float[Array, " M"], model: FiniteStateModel) -> Float[Array, ""]:
+    """Return λ_i = (2/√3) a_1^0, the mean inflow of the first state over ΩR (axial flow)."""
+    return 2 / np.sqrt(3) * a[model.modes.index(0, 1)]
+
+
+def flow_matrices(
+    a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel, skewed: bool = True
+) -> tuple[Float[Array, " M"], Float[Array, "M M"]]:
+    """Return the diagonal of V and L⁻¹M at the present mass flow and skew.
+
+    skewed=False leaves the wake straight (χ = 0), where L⁻¹M = 1 and no system is solved. The skew follows the mean
+    inflow of the first state, χ = atan(μ/λ); λ_i in the mass flow is that of L⁻¹Ma.
+    """
+    first = model.modes.index(0, 1)
+    mass = jnp.asarray(apparent_mass(model.modes, model.modes), a.dtype)
+    through = inputs.climb + mean_induced_inflow(a, model)
+    if skewed:
+        speed = _total_speed(inputs.mu, through)
+        below = speed + jnp.abs(through)
+        x = inputs.mu / jnp.where(below > 0, below, 1.0)  # tan(χ/2) = sin χ/(1 + cos χ)
+        inverse = jnp.linalg.solve(influence(model.modes, model.modes, x), mass)
+        induced = 2 / np.sqrt(3) * inverse[first] @ a
+    else:
+        inverse, induced = jnp.eye(len(model.modes), dtype=a.dtype), mean_induced_inflow(a, model)
+    through = inputs.climb + induced
+    speed = _total_speed(inputs.mu, through)
+    if model.mass_flow == "linear":
+        return jnp.full_like(a, 1) * speed, inverse
+    later = (inputs.mu**2 + through * (through + induced)) / jnp.where(speed > 0, speed, 1.0)
+    return jnp.where(np.arange(len(model.modes)) == first, speed, later), inverse
+
+
+@eqx.filter_jit
+def rhs(
+    t: Float[Array, ""], state: FiniteState, inputs: RotorInputs, model: FiniteStateModel, skewed: bool = True
+) -> FiniteState:
+    """Return d(state)/dψ (Eq. 1); t does not enter. The ground is quasi-steady: c follows a through c = G a.
+
+    Start from a state whose c is G a (`with_ground`). In skewed flow G still assumes the wake under the rotor.
+    """
+    del t
+    v, inverse = flow_matrices(state.a, inputs, model, skewed)
+    d, mass = (jnp.asarray(f(model.modes, model.modes), state.a.dtype) for f in (damping, apparent_mass))
+    rate = jnp.linalg.solve(mass, d @ (inputs.tau - v * (inverse @ state.a)))
+    return with_ground(rate, model)
+
+
+def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
+    """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
+    if model.ground is None:
+        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
+    return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
+
+
+@eqx.filter_jit
+def costates(
+    psi: Float[Array, " T"],
+    a: Float[Array, "T M"],
+    inputs: RotorInputs,
+    model: FiniteStateModel,
+    skewed: bool = True,
+) -> Float[Array, "T M"]:
+    """Return the costates Δ over a time window, marched backward from its end (Eq. 1, second row).
+
+    psi: instants (rad), increasing; a: states there, which give mass flow and skew; inputs: with leading axis T.
+    The rule is the implicit trapezoidal one, stable for any step and of second order. At the end Δ is taken steady;
+    that choice fades within the transit time of the wake. Raises InputError where the shapes do not agree.
+    """
+    if a.shape[0] != psi.size or inputs.tau.shape != a.shape:
+        shapes = f"{psi.shape}, {a.shape}, {inputs.tau.shape}"
+        raise InputError(f"Arguments `psi`, `a`, `inputs.tau` must share T and M, but have {shapes}")
+    d, mass = (jnp.asarray(f(model.modes, model.modes), a.dtype) for f in (damping, apparent_mass))
+    v, inverse = jax.vmap(lambda a, i: flow_matrices(a, i, model, skewed))(a, inputs)
+    decay = d @ (v[:, :, None] * inverse)  # −M Δ̇ + decay Δ = D τ
+    force = inputs.tau @ d.T
+
+    def back(later: Array, row: tuple[Array, ...]) -> tuple[Array, Array]:
+        step, decay_now, decay_later, force_now, force_later = row
+        known = (mass / step - decay_later / 2) @ later + (force_now + force_later) / 2
+        now = jnp.linalg.solve(mass / step + decay_now / 2, known)
+        return now, now
+
+    last = jnp.linalg.solve(decay[-1], force[-1])
+    rows = (jnp.diff(psi), decay[:-1], decay[1:], force[:-1], force[1:])
+    return jnp.concatenate([jax.lax.scan(back, last, rows, reverse=True)[1], last[None]])
+
+
+def _at(time: Float[Array, "*N"], psi: Float[Array, " T"], rows: Float[Array, "T M"]) -> Float[Array, "M ..."]:
+    """Rows interpolated linearly in time, held constant outside the window."""
+    return jax.vmap(lambda column: jnp.interp(time, psi, column), in_axes=1)(rows)
+
+
+@eqx.filter_jit
+def axial_velocity(
+    time: Float[Array, ""],
+    points: Float[Array, "*N 3"],
+    psi: Float[Array, " T"],
+    a: Float[Array, "T M"],
+    delta: Float[Array, "T M"],
+    speed: Float[Array, ""],
+    model: FiniteStateModel,
+) -> Float[Array, "*N"]:
+    """Return the rotor's downward velocity (over ΩR) at hub-frame points and one time, for a straight wake.
+
+    Above the disk Σ a(t) Φ. Below it (Eq. 7 with right parities) v_A(t) = v_B(t₀) + v_C†(t₀) − v_D†(t), where
+    t₀ = t − depth/speed is when the fluid at A passed the disk at B = C, and D is the mirror point above; † takes the
+    costates `delta`. With odd states alone the flow is exact in steady motion and off by some per cent at a reduced
+    frequency ω/speed of 0.3; even states (`even_terms`) make it converge at any frequency.
+    psi: instants of the window, which must hold t₀ … t; speed: convection speed of the wake, over ΩR.
+    """
+    x, y, z = jnp.moveaxis(points, -1, 0)
+    mirror, foot = (jnp.stack([x, y, height], axis=-1) for height in (jnp.abs(z), jnp.zeros_like(z)))
+    phi, disk = pressure_functions(model.modes, mirror), pressure_functions(model.modes, foot)
+    passed = time - jnp.maximum(-z, 0.0) / speed
+    below = jnp.sum((_at(passed, psi, a) + _at(passed, psi, delta)) * disk, axis=0)
+    below = below - jnp.tensordot(_at(time, psi, delta), phi, 1)
+    return jnp.where(z >= 0, jnp.tensordot(_at(time, psi, a), phi, 1), below)
