@@ -15,13 +15,14 @@ from rotorjax.potential.field import (
     velocity_potentials,
 )
 from rotorjax.potential.legendre import legendre_p, legendre_q
-from rotorjax.potential.modes import Mode, ModeTable, ground_modes, rotor_modes
+from rotorjax.potential.modes import Mode, ModeTable, ground_modes, mode_table, rotor_modes
 
 ROTOR = rotor_modes(3, 3)
 GROUND = ground_modes(5, 3)
 ABOVE = jnp.array([[0.3, 0.2, 0.4], [-0.7, 0.1, 0.05], [1.3, -0.8, 0.6], [0, 0, 1.0], [2.0, 1.0, 0], [0.4, -0.3, 7.0]])
 AXIAL, FIELD = jax.jit(axial_functions, static_argnums=0), jax.jit(field_functions, static_argnums=0)
 TABLES = pytest.mark.parametrize("modes", [ROTOR, GROUND], ids=["rotor", "ground"])
+BOTH = rotor_modes(1, 2, even_terms=2)
 
 
 @TABLES
@@ -101,6 +102,12 @@ def test_outside_the_wake_the_flow_of_the_rotor_is_upward_below_the_disk():
     mirror = point.at[2].set(0.5)
     np.testing.assert_allclose(disk_functions(ROTOR, point[0], point[1]), 0, atol=1e-15)
     np.testing.assert_allclose(axial_functions(ROTOR, point), -pressure_functions(ROTOR, mirror), atol=1e-15)
+
+
+def test_table_of_both_parities_is_its_two_parts():
+    points = jnp.array([[0.3, 0.2, -0.4], [1.2, 0.1, -0.4], [0.3, 0.2, 0.4]])
+    parts = [FIELD(mode_table(first, 1, 2), points) for first in (1, 2)]
+    np.testing.assert_allclose(FIELD(BOTH, points), jnp.concatenate(parts, axis=1), rtol=1e-12, atol=1e-15)
 
 
 def test_far_wake_is_twice_the_disk_flow():

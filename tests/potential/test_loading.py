@@ -65,6 +65,13 @@ def test_blades_averaged_over_a_turn_give_the_distribution():
     np.testing.assert_allclose(mean, whole, rtol=1e-12, atol=1e-17)
 
 
+def test_even_modes_carry_no_load():
+    modes, dct_dr = rotor_modes(0, 2, even_terms=2), 0.01 * R**2
+    tau = loading.from_axisymmetric(dct_dr, R, R_WEIGHT, modes)
+    np.testing.assert_allclose(tau[:2], loading.from_axisymmetric(dct_dr, R, R_WEIGHT, rotor_modes(0, 2)))
+    assert not np.any(tau[2:])
+
+
 def test_bad_input_is_refused():
     with pytest.raises(InputError, match="carry a load"):
         loading.shaping(ground_modes(0, 1), R)

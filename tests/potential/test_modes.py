@@ -14,6 +14,13 @@ def test_rotor_and_ground_tables():
     assert list(ground_modes(1, 2).diagonal) == [True, False, True, True, False, False]
 
 
+def test_even_terms_follow_the_odd_ones():
+    table = rotor_modes(1, 1, even_terms=1)
+    assert table.pairs == ((0, 1), (1, 2), (0, 2), (1, 3))
+    assert table.parity == "both"
+    assert list(table.odd) == [True, True, True, False, False, False]
+
+
 def test_index():
     assert rotor_modes(1, 1).index(1, 2, "sin") == 2
     with pytest.raises(InputError, match="must contain"):
