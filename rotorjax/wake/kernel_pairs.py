@@ -74,17 +74,23 @@ def columns(a: Vector) -> Vector:
     return a[0][:, None], a[1][:, None], a[2][:, None]
 
 
-def pairs(points: Vector, nodes: Array, soft: Array) -> Pairs:
+def pairs(points: Vector, nodes: Array, soft: Array, *, slice_r: bool = False) -> Pairs:
     """Geometry of all pairs of N points and U segments, whose starts are the first and ends the last U of the nodes.
 
     A chain has U + 1 nodes, so that a distance serves the segments on both sides of its node; loose segments have 2U.
+    slice_r: cut r₁ and r₂ out of all nodes' r instead of subtracting again. The numbers are the same, but XLA fuses the
+    plain sum three times better with it and the derivatives twice better without.
     """
     count = soft.shape[0]
+    start, end = nodes[:, :count], nodes[:, -count:]
     r = subtract(points, columns(nodes))
     d, i = _distance(r)
-    edge = subtract(nodes[:, -count:], nodes[:, :count])
-    r1, r2 = tuple(x[:count] for x in r), tuple(x[-count:] for x in r)
-    return Pairs(r1, r2, d[:count], d[-count:], i[:count], i[-count:], columns(edge), soft[:, None])
+    if slice_r:
+        r1, r2 = tuple(x[:count] for x in r), tuple(x[-count:] for x in r)
+    else:
+        r1, r2 = subtract(points, columns(start)), subtract(points, columns(end))
+    edge = columns(subtract(end, start))
+    return Pairs(r1, r2, d[:count], d[-count:], i[:count], i[-count:], edge, soft[:, None])
 
 
 def _distance(r: Vector) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from rotorjax.wake.kernel_pairs import Vector, add, columns, cross, dot, influence, pairs, slopes, subtract
+from rotorjax.wake.kernel_pairs import Vector, add, cross, dot, influence, pairs, slopes, subtract
 
 
 class Segments(NamedTuple):
@@ -50,7 +50,7 @@ def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     x = tuple(points)
 
     def step(total: Vector, block: Block):
-        k = influence(pairs(x, block.nodes, block.soft), settings.exponent)
+        k = influence(pairs(x, block.nodes, block.soft, slice_r=True), settings.exponent)
         for u in range(k.shape[0]):
             c = cross(block.whirl[:, u], subtract(x, block.nodes[:, u]))
             total = add(total, _times(k[u], c))
