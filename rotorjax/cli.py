@@ -1,6 +1,7 @@
 """The command line: `rotorjax COMMAND …`. Bad input is one line on stderr and exit code 2."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -44,9 +45,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"rotorjax {chosen.command}: error: {' '.join(str(error).split())}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
-        print(f"rotorjax {chosen.command}: interrupted; finished cases are kept", file=sys.stderr)
+        print(f"\nrotorjax {chosen.command}: interrupted; finished cases are kept", file=sys.stderr)
         return INTERRUPTED
 
 
+def script() -> NoReturn:
+    """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit."""
+    code = main()
+    if code == INTERRUPTED:
+        sys.stdout.flush()
+        os._exit(code)
+    sys.exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    script()

@@ -90,6 +90,11 @@ def diameter_axes(axes: Axes, ylabel: str, *, sides: bool = False) -> None:
             axes.text(x, 1.01, text, transform=axes.transAxes, **look)
 
 
+def legend_below(axes: Axes, columns: int) -> None:
+    """A legend under the axes, where it hides no curve."""
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=columns)
+
+
 def across(r: np.ndarray, mountain: np.ndarray, valley: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """One curve from the valley's tip (−1) to the mountain's (1), broken where no blade reaches."""
     gap = [] if r[0] < 0.02 else [np.nan]

@@ -74,8 +74,8 @@ def converged(reading: Reading) -> Verdict:
 CHECKS: tuple[tuple[str, str, Callable[[Reading], Verdict]], ...] = (
     (
         "OGE",
-        "C_T between 0.0045 and 0.0065, ideal figure of merit C_T^1.5/(√2 C_Pi) between 0.80 and 1.00, mean inflow within "
-        "12 % of √(C_T/2).",
+        "C_T between 0.0045 and 0.0065, ideal figure of merit C_T^1.5/(√2 C_Pi) between 0.80 and 1.00, mean inflow "
+        "within 12 % of √(C_T/2).",
         hovers,
     ),
     (
@@ -91,7 +91,8 @@ CHECKS: tuple[tuple[str, str, Callable[[Reading], Verdict]], ...] = (
     ),
     (
         "Ground",
-        "Normal velocity on the plane: free wake at most 1e-10 of √(C_T/2), VPBFSM at most 3 % rms of the incoming flow.",
+        "Normal velocity on the plane: free wake at most 1e-10 of √(C_T/2), VPBFSM at most 3 % rms of the "
+        "incoming flow.",
         ground_condition,
     ),
     ("Wake", "All wakes converged: residual below 1e-3 R, loads steady to 0.1 %.", converged),

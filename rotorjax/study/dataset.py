@@ -8,8 +8,7 @@ import xarray as xr
 
 from rotorjax.study import finite_state
 from rotorjax.study.cases import Case
-from rotorjax.study.finite_state import Stations
-from rotorjax.study.record import inflow_rms_difference
+from rotorjax.study.record import inflow_rms_difference, stations_at
 from rotorjax.study.settings import StudySettings
 from rotorjax.study.wake_file import STATE, case_of
 
@@ -63,7 +62,7 @@ def present(merged: xr.Dataset) -> list[Case]:
 
 def terms_study(data: xr.Dataset, settings: StudySettings) -> dict[str, xr.Variable]:
     """Inflow out of ground effect for several numbers of pressure terms, and its rms difference to the free wake."""
-    stations = Stations(data["radius"].to_numpy(), data["panel_width"].to_numpy(), data["station_azimuth"].to_numpy())
+    stations = stations_at(data, data["station_azimuth"].to_numpy())
     limited = replace(settings, radial_terms=max(TERMS))
     full = finite_state.from_loads(Case(), limited, data["free_wake_dct_dr"].to_numpy(), stations)
     modes = finite_state.model_of(Case(), limited).modes

@@ -5,7 +5,7 @@ import numpy as np
 from rotorjax.study.cases import Case
 from rotorjax.study.dataset import present
 from rotorjax.study.markdown import table
-from rotorjax.study.reading import Reading
+from rotorjax.study.reading import Reading, listed
 
 ZONES = {"root (0.25–0.5)": (0.25, 0.5), "middle (0.5–0.8)": (0.5, 0.8), "tip (0.8–0.95)": (0.8, 0.95)}
 
@@ -50,41 +50,47 @@ def _row(reading: Reading, case: Case) -> list[object]:
 
 
 def _reasons(reading: Reading, cases: list[Case]) -> list[str]:
-    oge = Case()
     grounded = [case for case in cases if case.height is not None]
-    texts = [
-        "The VPBFSM gets the free wake's loading, so what differs is only how a loading makes inflow. Three things do.",
-    ]
-    if oge in cases:
-        texts.append(
-            "**The wake contracts, the cylinder does not.** Out of ground effect the tip vortex passes "
-            f"{contraction(reading, oge):.2f} R within 0.3 R below the disk, where the VPBFSM keeps a cylinder of radius "
-            "1. Inside the vortex the free wake's inflow is higher, outside it is lower, up to upwash at the tip: the "
-            f"rms difference is {reading.zone_rms(oge, 'vpbfsm', ZONES['root (0.25–0.5)']):.3f}, "
-            f"{reading.zone_rms(oge, 'vpbfsm', ZONES['middle (0.5–0.8)']):.3f} and "
-            f"{reading.zone_rms(oge, 'vpbfsm', ZONES['tip (0.8–0.95)']):.3f} in the three zones. Three polynomials "
-            f"smooth over it; scaled to the same mean, {shape_rms(reading, oge, 'vpbfsm'):.3f} remains."
-        )
+    texts = ["The VPBFSM gets the free wake's loading, so what differs is only the inflow that a loading makes."]
+    if Case() in cases:
+        texts.append(_contraction_text(reading))
     if grounded:
-        worst = max(grounded, key=lambda c: reading.number(c, "vpbfsm_inflow_rms_difference"))
-        best = min(grounded, key=lambda c: reading.number(c, "vpbfsm_inflow_rms_difference"))
-        better = sum(
-            reading.number(c, "exact_image_inflow_rms_difference") < reading.number(c, "vpbfsm_inflow_rms_difference")
-            for c in grounded
-        )
-        texts.append(
-            "**The ground acts through a factor, not through physics.** Sources on the footprint alone over-predict the "
-            "ground effect, and the printed factor was fitted at one height to hold it back. Over ground the difference "
-            f"is smallest at {best.label} ({reading.number(best, 'vpbfsm_inflow_rms_difference'):.3f}) and largest at "
-            f"{worst.label} ({reading.number(worst, 'vpbfsm_inflow_rms_difference'):.3f}). The exact image of the same "
-            f"cylinder, with no factor, is closer to the free wake in {better} of {len(grounded)} cases."
-        )
-        low = min(grounded, key=lambda c: (c.slope_deg, c.height or 0))
-        texts.append(
-            "**The real wake turns outward above the ground.** The free wake's tip vortices run out along the plane "
-            "and leave the disk's neighbourhood; a cylinder that ends at the plane, or at its image, keeps all vorticity "
-            f"at r = 1. At {low.label} the mean inflow is {reading.mean(low, 'free_wake'):.3f} in the free wake, "
-            f"{reading.mean(low, 'vpbfsm'):.3f} with the printed factor and {reading.mean(low, 'exact_image'):.3f} with "
-            "the exact image (over the OGE mean)."
-        )
+        texts += [_factor_text(reading, grounded), _spreading_text(reading, grounded)]
     return texts
+
+
+def _contraction_text(reading: Reading) -> str:
+    oge = Case()
+    bias = [reading.zone_bias(oge, "vpbfsm", zone) for zone in ZONES.values()]
+    return (
+        "**The wake contracts, the cylinder does not.** Out of ground effect the tip vortex narrows to "
+        f"{contraction(reading, oge):.2f} R within 0.3 R below the disk, where the VPBFSM keeps a cylinder of radius "
+        "1. A vortex inside r = 1 pulls inflow inward from the tip: free wake less VPBFSM is "
+        f"{listed(list(ZONES), bias)}. A few polynomials cannot follow the step at the vortex either: scaled to "
+        f"the same mean, an rms difference of {shape_rms(reading, oge, 'vpbfsm'):.3f} remains."
+    )
+
+
+def _factor_text(reading: Reading, grounded: list[Case]) -> str:
+    paper = {case: reading.number(case, "vpbfsm_inflow_rms_difference") for case in grounded}
+    exact = {case: reading.number(case, "exact_image_inflow_rms_difference") for case in grounded}
+    worst, best = max(grounded, key=paper.__getitem__), min(grounded, key=paper.__getitem__)
+    better = sum(exact[case] < paper[case] for case in grounded)
+    return (
+        "**The ground acts through an empirical factor.** Sources on the footprint alone over-predict the ground "
+        "effect, and the printed factor, fitted at one height, holds them back. The difference is "
+        f"smallest at {best.label} ({paper[best]:.3f}) and largest at {worst.label} ({paper[worst]:.3f}). The exact "
+        f"image of the same cylinder, with no factor, is closer to the free wake in {better} of {len(grounded)} cases."
+    )
+
+
+def _spreading_text(reading: Reading, grounded: list[Case]) -> str:
+    low = min(grounded, key=lambda c: (c.slope_deg, c.height or 0))
+    path = reading.field(low, "tip_vortex")
+    reach = float(np.nanmax(np.hypot(path[..., 0], path[..., 1])))
+    return (
+        "**The real wake turns outward above the ground.** A cylinder that ends at the plane keeps all vorticity at "
+        f"r = 1; at {low.label} the free wake's tip vortices run out to r = {reach:.2f} R. The mean inflow there is "
+        f"{reading.mean(low, 'free_wake'):.3f} in the free wake, {reading.mean(low, 'vpbfsm'):.3f} with the printed "
+        f"factor and {reading.mean(low, 'exact_image'):.3f} with the exact image (over the OGE mean)."
+    )

@@ -9,13 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rotorjax.plotting import (
-    EXACT_IMAGE,
     FREE_WAKE,
     INK,
     MODEL_STYLE,
     VPBFSM,
     across,
     diameter_axes,
+    legend_below,
     new_figure,
     polar_contour,
     save,
@@ -127,7 +127,7 @@ def inflow_of(case: Case, title: str) -> Draw:
             axes.plot(*across_disk(data, model, float(merged["reference_inflow"])), **look)
         diameter_axes(axes, INFLOW, sides=case.slope_deg > 0)
         axes.set_title(title, pad=18 if case.slope_deg else 6)
-        axes.legend(loc="lower center")
+        legend_below(axes, 3)
         return figure
 
     return draw
@@ -146,7 +146,7 @@ def inflow_series(model: str, pick: Callable[[xr.Dataset], Sequence[Case]], titl
         sloped = any(case.slope_deg for case in cases)
         diameter_axes(axes, INFLOW, sides=sloped)
         axes.set_title(title, pad=18 if sloped else 6)
-        axes.legend(ncols=2 if len(cases) > 4 else 1, loc="lower center")
+        legend_below(axes, 4)
         return figure
 
     return draw
@@ -190,34 +190,37 @@ def contours(merged: xr.Dataset, cases: Sequence[Case], title: str) -> Figure:
 
 def overview(merged: xr.Dataset) -> Figure | None:
     """The study at a glance: both models' inflow over height and on a slope, and the loading there."""
-    level = [case for case in (Case(), Case(2.0), Case(1.0), Case(0.5), Case(0.75)) if select(merged, case) is not None]
-    slopes = [case for case in (Case(1.0, 15.0), Case(1.0, 30.0)) if select(merged, case) is not None]
-    if len(level) < 2 or not slopes:
+    level = [case for case in (Case(), Case(2.0), Case(1.0), Case(0.75)) if select(merged, case) is not None]
+    sloped = Case(1.0, 15.0)
+    if len(level) < 2 or select(merged, sloped) is None:
         return None
-    figure = new_figure(12.5, 3.9)
+    figure = new_figure(12.5, 4.4)
     grid = figure.add_gridspec(1, 3, width_ratios=[1, 1, 0.85])
-    reference = float(merged["reference_inflow"])
-    for column, (cases, title) in enumerate(((level[:4], "Level ground"), (slopes[:1], slopes[0].label))):
-        axes = figure.add_subplot(grid[column])
-        for data, case, colour in _coloured(merged, cases):
-            colour = colour if column == 0 else FREE_WAKE
-            name = f"{case.label}: " if column == 0 else ""
-            axes.plot(*across_disk(data, "free_wake", reference), color=colour, marker="o", label=f"{name}free wake")
-            colour = colour if column == 0 else VPBFSM
-            axes.plot(*across_disk(data, "vpbfsm", reference), color=colour, linestyle="--", label=f"{name}VPBFSM")
-            if column:
-                line = across_disk(data, "exact_image", reference)
-                axes.plot(*line, color=EXACT_IMAGE, linestyle=":", label="VPBFSM, exact image")
-        diameter_axes(axes, "" if column else INFLOW, sides=column == 1)
-        axes.set_title(title, pad=18)
-        axes.legend(fontsize=7.5, ncols=2 if column == 0 else 1, loc="lower center")
+    _overview_level(figure.add_subplot(grid[0]), merged, level)
+    axes = figure.add_subplot(grid[1])
+    for model, look in MODEL_STYLE.items():
+        axes.plot(*across_disk(merged.sel(case=sloped.name), model, float(merged["reference_inflow"])), **look)
+    diameter_axes(axes, "", sides=True)
+    axes.set_title(sloped.label, pad=18)
+    legend_below(axes, 2)
     axes = figure.add_subplot(grid[2], projection="polar")
-    field = merged.sel(case=slopes[0].name)["free_wake_dct_dr"].to_numpy()
+    field = merged.sel(case=sloped.name)["free_wake_dct_dr"].to_numpy()
     radius, azimuth = merged["radius"].to_numpy(), merged["azimuth"].to_numpy()
     filled = polar_contour(axes, radius, azimuth, field, shared_levels([field]))
-    axes.set_title(f"{slopes[0].label}: free wake's loading", pad=18)
+    axes.set_title(f"{sloped.label}: free wake's loading", pad=18)
     figure.colorbar(filled, ax=axes, label=LOADING, shrink=0.75, pad=0.12)
     return figure
+
+
+def _overview_level(axes: Axes, merged: xr.Dataset, cases: Sequence[Case]) -> None:
+    """Free wake (points and lines) and VPBFSM (dashes) over height."""
+    reference = float(merged["reference_inflow"])
+    for data, case, colour in _coloured(merged, cases):
+        axes.plot(*across_disk(data, "free_wake", reference), color=colour, marker="o", label=case.label)
+        axes.plot(*across_disk(data, "vpbfsm", reference), color=colour, linestyle="--")
+    diameter_axes(axes, INFLOW)
+    axes.set_title("Level ground: free wake (points), VPBFSM (dashes)", pad=18)
+    legend_below(axes, 4)
 
 
 def _level(merged: xr.Dataset) -> list[Case]:

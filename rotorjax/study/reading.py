@@ -1,6 +1,7 @@
 """Numbers read off the merged data set: means, sides, extremes; what claims and report quote."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -88,6 +89,13 @@ class Reading:
         pair = self.inflow(case, model), self.inflow(case, "free_wake")
         return rms_difference(*pair, self.r, self.widths, between)
 
+    def zone_bias(self, case: Case, model: str, between: tuple[float, float]) -> float:
+        """Area-weighted mean over an annulus of the free wake's inflow less a model's."""
+        inside = (self.r >= between[0]) & (self.r <= between[1])
+        weights = np.where(inside, self.r * self.widths, 0.0)
+        gap = self.inflow(case, "free_wake") - self.inflow(case, model)
+        return float(np.mean(gap @ weights) / weights.sum())
+
     def peak(self, case: Case, between: tuple[float, float], *, lowest: bool = False) -> tuple[float, float, float]:
         """Value, radius and azimuth (degrees) of the free wake's largest (or smallest) loading in an annulus."""
         inside = np.flatnonzero((self.r >= between[0]) & (self.r <= between[1]))
@@ -105,7 +113,7 @@ class Reading:
 
 def falls(values: list[float]) -> bool:
     """Whether each value is below the one before it."""
-    return all(b < a for a, b in zip(values, values[1:], strict=False))
+    return all(b < a for a, b in pairwise(values))
 
 
 def listed(names: list[str], values: list[float], digits: int = 3) -> str:

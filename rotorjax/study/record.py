@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -52,7 +53,12 @@ def stations_of(data: xr.Dataset, settings: StudySettings) -> Stations:
     psi = 2 * np.pi / settings.wake.azimuths * np.arange(settings.wake.azimuths)
     if data.sizes["azimuth"] not in (1, psi.size):
         psi = data["azimuth"].to_numpy()
-    return Stations(data["radius"].to_numpy(), data["panel_width"].to_numpy(), psi)
+    return stations_at(data, psi)
+
+
+def stations_at(data: xr.Dataset, psi: np.ndarray) -> Stations:
+    """The radii and panel widths of a data set at azimuths psi (rad)."""
+    return Stations(*(jnp.asarray(v, float) for v in (data["radius"].to_numpy(), data["panel_width"].to_numpy(), psi)))
 
 
 def add_finite_state(data: xr.Dataset, settings: StudySettings) -> xr.Dataset:

@@ -47,8 +47,8 @@ def _introduction(merged: xr.Dataset, wall_time_s: float) -> str:
     text = (
         f"Rotor {settings['rotor']}, collective {settings['collective_deg']:g}°, rigid blades, hover. Each case is "
         "solved with the free wake; its loading dC_T/dr̄(r̄, ψ) drives the VPBFSM, once with the paper's printed factor "
-        "(π/7)^(η²) on the r = j terms and once with the exact image of the rigid wake cylinder. All inflow is induced, "
-        "positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
+        "(π/7)^(η²) on the r = j terms and once with the exact image of the rigid wake cylinder. All inflow is "
+        "induced, positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
         f"{float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, 90° the "
         "advancing, 180° the valley, 270° the retreating side.\n\n"
         f"{len(merged['case'])} cases, {wall_time_s:.0f} s, of which {float(merged['compile_time_s'].sum()):.0f} s "
@@ -77,8 +77,8 @@ def _case_table(reading: Reading) -> str:
         rows.append([case.label, *values])
     note = (
         "\n\nResidual: rms node displacement when the wake is passed once through its own velocities. ΔC_T: relative "
-        "change of C_T in that pass. Ground: rms normal velocity on the plane, over √(C_T/2) for the free wake and over "
-        "the incoming flow inside the wake radius for the VPBFSM. Rms difference: area-weighted over "
+        "change of C_T in that pass. Ground: rms normal velocity on the plane, over √(C_T/2) for the free wake and "
+        "over the incoming flow inside the wake radius for the VPBFSM. Rms difference: area-weighted over "
         "0.25 ≤ r̄ ≤ 0.95, both inflows over the OGE mean."
     )
     return table(head, rows) + note

@@ -15,6 +15,7 @@ from rotorjax.io.atomic import make_folder
 from rotorjax.study import wake_file
 from rotorjax.study.cases import Case, neighbour
 from rotorjax.study.record import add_finite_state
+from rotorjax.study.schedule import Schedule
 from rotorjax.study.settings import StudySettings, differences
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.solution import Solution, solve
@@ -39,29 +40,47 @@ class StudyResult:
 
 
 def solve_cases(
-    cases: Sequence[Case], settings: StudySettings, folder: str | Path, *, show: bool = True, solver: Solver = solve
+    cases: Sequence[Case],
+    settings: StudySettings,
+    folder: str | Path,
+    *,
+    show: bool = True,
+    solver: Solver = solve,
+    workers: int = 2,
 ) -> StudyResult:
     """Solve all cases of a study, keeping each in folder/cases as soon as it is done; what is there is not redone.
 
-    show: progress bars. A case that does not converge is kept with its last good state, and no other starts from it.
-    Raises InputError where the folder cannot be written or holds another study.
+    show: progress bar. workers: threads. A case that does not converge is kept with its last good state, and no other
+    starts from it. Raises InputError where the folder cannot be written or holds another study.
     """
     kept = make_folder(make_folder(folder) / "cases")
-    done: dict[Case, xr.Dataset] = {}
-    with tqdm(total=len(cases), desc="study", unit="case", disable=not show) as bar:
-        for case in cases:
-            path = kept / f"{case.name}.nc"
-            data = _reload(path, settings) if path.exists() else None
-            if data is None:
-                bar.set_description(f"study: {case.label}")
-                data = solve_case(case, settings, done, _meter(bar), solver)
-                netcdf.write(path, data)
-            done[case] = data
+    found = {case: _reload(kept / f"{case.name}.nc", settings) for case in cases if (kept / f"{case.name}.nc").exists()}
+    todo = [case for case in cases if case not in found]
+    with tqdm(total=len(cases), initial=len(found), desc="study", unit="case", disable=not show) as bar:
+
+        def work(case: Case, done: dict[Case, xr.Dataset]) -> xr.Dataset:
+            def progress(stage: str, residual: float) -> None:
+                schedule.check()
+                bar.set_postfix_str(f"{case.label}: {stage}, residual {residual:.1e}")
+
+            return solve_case(case, settings, found | done, progress, solver)
+
+        def keep(case: Case, data: xr.Dataset) -> None:
+            netcdf.write(kept / f"{case.name}.nc", data)
             bar.update(1)
             if not bool(data["converged"]):
                 bar.write(f"{case.label} did not converge: {data.attrs['why']}")
-    diverged = tuple(case.label for case, data in done.items() if not bool(data["converged"]))
-    return StudyResult(tuple(done.values()), diverged)
+
+        schedule = Schedule(todo, lambda case: _needed(case, cases, found), work, keep)
+        done = found | schedule.run(workers)
+    results = tuple(done[case] for case in cases)
+    return StudyResult(results, tuple(c.label for c in cases if not bool(done[c]["converged"])))
+
+
+def _needed(case: Case, cases: Sequence[Case], found: dict[Case, xr.Dataset]) -> Case | None:
+    """The case that has to be solved before this one; None where none has."""
+    near = neighbour(case, cases[: cases.index(case)])
+    return None if near in found else near
 
 
 def solve_case(
@@ -76,13 +95,6 @@ def solve_case(
     start = None if near is None else wake_file.to_solution(done[near], settings)
     solution = solver(wake_file.model_of(case, settings), start, progress)
     return add_finite_state(wake_file.to_dataset(case, solution, settings), settings)
-
-
-def _meter(bar: tqdm) -> Progress:
-    def progress(stage: str, residual: float) -> None:
-        bar.set_postfix_str(f"{stage}, residual {residual:.1e}")
-
-    return progress
 
 
 def _reload(path: Path, settings: StudySettings) -> xr.Dataset:

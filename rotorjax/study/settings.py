@@ -76,8 +76,9 @@ def study_settings(
 ) -> StudySettings:
     """Make settings from plain values; `wake` overrides settings of the free wake.
 
-    rotor: name in the catalogue or a TOML file. collective_deg: None takes the rotor file's (18 for the UH-60, the paper's). climb_ratio: climb
-    velocity over ΩR. quick: the coarser free wake. Raises InputError where a value is not allowed.
+    rotor: name in the catalogue or a TOML file. collective_deg: None takes the rotor file's (18 for the UH-60, the
+    paper's). climb_ratio: climb velocity over ΩR. quick: the coarser free wake. Raises InputError where a value is not
+    allowed.
     """
     check_number("climb", climb_ratio, -0.5, 0.5)
     if harmonics != int(harmonics) or not 1 <= harmonics <= 4:

@@ -10,6 +10,7 @@ from rotorjax.plotting import (
     MODEL_STYLE,
     across,
     diameter_axes,
+    legend_below,
     new_figure,
     polar_contour,
     save_file,
@@ -70,7 +71,7 @@ def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
             axes.plot(*across(data["radius"].to_numpy(), _along(field, 0), _along(field, 1)), **MODEL_STYLE[model])
         diameter_axes(axes, label, sides=case.slope_deg > 0)
         axes.set_title(case.label, pad=18 if case.slope_deg else 6)
-        axes.legend()
+        legend_below(axes, 3)
         if case.slope_deg:
             wake = "free_wake_inflow" in data
             field = data["free_wake_inflow" if wake else "vpbfsm_inflow"].to_numpy() / scale

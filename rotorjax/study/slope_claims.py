@@ -131,8 +131,8 @@ SLOPE_CLAIMS: tuple[tuple[str, str, Callable[[Reading], Verdict]], ...] = (
     ),
     (
         "Fig. 12",
-        "h = 1, 15°: the VPBFSM closely matches the free wake on the valley side, with some discrepancy on the mountain "
-        "side.",
+        "h = 1, 15°: the VPBFSM closely matches the free wake on the valley side, with some discrepancy on the "
+        "mountain side.",
         closer_on_valley(Case(SLOPE_HEIGHT, 15.0)),
     ),
     (
