@@ -94,12 +94,20 @@ def test_unstable_modes_are_kept():
 def test_band_beats_the_whole_in_its_band():
     full = heat()
     omega = np.linspace(0.05, 2.0, 40)
-    band, whole = balance_in_band(full, 7, 2.0), balance(full, 7)
+    band, whole = balance_in_band(full, 7, 2.0, tail=0.0), balance(full, 7)
     real = ([0, 1, 1], [0, 0, 1])  # the pair does not reach the rod: that response is zero in the full model
     found = bode_error_db(full, band.model, omega)[real].max()
     assert found < 0.1
     assert found < 0.3 * bode_error_db(full, whole.model, omega)[real].max()
     assert np.abs(band.model.response(omega)[:, 0, 1]).max() < 1e-4
+
+
+def test_whole_tail_is_plain_balancing():
+    """With weight 1 above the band the sampled Gramians are the whole ones: the same singular values."""
+    full = heat()
+    one = model(full.a[:30, :30], full.b[:30, :1], full.c[:1, :30])
+    ratio = balance_in_band(one, 4, 2.0, tail=1.0, points=200).singular[:4] / balance(one, 4).singular[:4]
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-6)
 
 
 def test_band_does_not_mind_units():
