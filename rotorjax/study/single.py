@@ -29,7 +29,7 @@ def check_case(case: Case, settings: StudySettings) -> None:
 
 
 def single_case(
-    case: Case, settings: StudySettings, model: Model, progress: Progress | None = None, solver: Solver = solve
+    case: Case, settings: StudySettings, model: Model, progress: Progress | None = None, *, solver: Solver = solve
 ) -> tuple[xr.Dataset, float | None]:
     """Solve one case; return it and the free wake's mean inflow out of ground effect, over ΩR, where it is needed.
 

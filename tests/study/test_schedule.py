@@ -42,7 +42,7 @@ def test_an_error_ends_everything():
     assert kept == ["a", "b"]
 
 
-def test_an_interrupt_stops_workers_at_their_next_check():
+def test_an_interrupt_stops_workers_at_their_next_check(monkeypatch):
     ended = threading.Event()
 
     def work(task, done):
@@ -59,7 +59,7 @@ def test_an_interrupt_stops_workers_at_their_next_check():
         def join(self, timeout=None):
             raise KeyboardInterrupt
 
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("rotorjax.study.schedule.threading.Thread", Interrupting)
+    monkeypatch.setattr("rotorjax.study.schedule.threading.Thread", Interrupting)
+    with pytest.raises(KeyboardInterrupt):
         schedule.run(1)
     assert ended.wait(10)

@@ -1,0 +1,158 @@
+"""The command line end to end with made-up wakes; bad input is one line and exit code 2."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from wakes import fails_at, made_up
+
+from rotorjax.cli import main
+from rotorjax.io import netcdf
+from rotorjax.study.run import solve_cases
+from rotorjax.study.single import single_case
+
+
+@pytest.fixture
+def solver(monkeypatch):
+    def use(solver):
+        for function in (solve_cases, single_case):
+            monkeypatch.setitem(function.__kwdefaults__, "solver", solver)
+
+    use(made_up)
+    return use
+
+
+def keys(entry):
+    return {name: sorted(value) if isinstance(value, dict) else None for name, value in entry.items()}
+
+
+def test_study_writes_everything_and_says_where(tmp_path, solver, capsys):
+    out = tmp_path / "out"
+    assert main(["study", "--out", str(out), "--quick"]) == 0
+    assert "5 cases" in capsys.readouterr().out
+    assert {p.name for p in out.iterdir()} >= {
+        "report.md",
+        "summary.json",
+        "cases.nc",
+        "cases",
+        "fig06.png",
+        "fig12.pdf",
+    }
+    assert sorted(p.stem for p in (out / "cases").iterdir()) == ["h0.75", "h1", "h1-slope15", "h2", "oge"]
+
+
+def test_a_diverged_case_gives_exit_code_1(tmp_path, solver, capsys):
+    solver(fails_at((2.0, 0.0)))
+    assert main(["study", "--out", str(tmp_path), "--heights", "2", "1", "--slopes"]) == 1
+    assert "not converged: h = 2" in capsys.readouterr().out
+    text = (tmp_path / "report.md").read_text()
+    assert "**Not converged:** h2 (made up to fail)" in text
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert [case["free_wake"]["converged"] for case in summary["cases"]] == [True, False, True]
+
+
+def test_an_interrupt_leaves_whole_files_and_code_130(tmp_path, solver, capsys):
+    def interrupted(model, start, progress):
+        if model.ground is not None:
+            raise KeyboardInterrupt
+        return made_up(model, start, progress)
+
+    solver(interrupted)
+    assert main(["study", "--out", str(tmp_path), "--quick"]) == 130
+    assert "finished cases are kept" in capsys.readouterr().err
+    for path in (tmp_path / "cases").iterdir():
+        netcdf.read(path)
+
+
+def test_inflow_of_both_models_has_the_keys_of_a_study_case(tmp_path, solver, capsys):
+    main(["study", "--out", str(tmp_path), "--heights", "1", "--slopes"])
+    entry = json.loads((tmp_path / "summary.json").read_text())["cases"][1]
+    files = {name: str(tmp_path / "one" / f"a.{name}") for name in ("json", "png", "nc")}
+    arguments = ["--height", "1", "--json", files["json"], "--plot", files["png"], "--netcdf", files["nc"]]
+    assert main(["inflow", *arguments]) == 0
+    ours = json.loads(Path(files["json"]).read_text())
+    assert keys(ours) == keys(entry)
+    assert ours["inflow_rms_difference"] == pytest.approx(entry["inflow_rms_difference"])
+    assert "vpbfsm_inflow" in netcdf.read(files["nc"])
+    assert os.path.getsize(files["png"]) > 1000
+    assert "mean inflow/ΩR, VPBFSM" in capsys.readouterr().out
+
+
+def test_inflow_on_a_slope_with_the_finite_state_model_alone(tmp_path, capsys):
+    path = tmp_path / "a.json"
+    picture = tmp_path / "a.pdf"
+    arguments = ["--height", "1", "--slope", "15", "--json", str(path), "--plot", str(picture)]
+    assert main(["inflow", "--model", "vpbfsm", *arguments]) == 0
+    found = json.loads(path.read_text())
+    assert found["free_wake"] is None
+    assert 0.004 < found["vpbfsm"]["CT"] < 0.012
+    assert found["vpbfsm"]["ground_normal_velocity_rms"] < 0.03
+    assert "mountain" in capsys.readouterr().out
+
+
+BAD = {
+    "inflow --height 0.5 --slope 30": "but is 0.5",
+    "inflow --height 0": "but is 0.0",
+    "inflow --height -1": "but is -1.0",
+    "inflow --height nan": "but is nan",
+    "inflow --height 3 --slope 60": "but is 60.0",
+    "inflow --slope 5": "`height` must be given",
+    "inflow --rotor uh61": "did you mean 'uh60'",
+    "inflow --rotor missing.toml": "missing.toml",
+    "inflow --collective 100": "but is 100",
+    "inflow --climb 0.02 --height 1": "`climb` must be 0 over ground",
+    "inflow --harmonics 9 --height 1": "but is 9",
+    "inflow --plot a.doc": "but is 'a.doc'",
+    "inflow --model other": "invalid choice: 'other'",
+    "inflow --height x": "invalid float value: 'x'",
+    "study": "--out",
+    "study --out {tmp}/file/out": "must be writable",
+    "study --out {tmp}/out --heights 0": "but is 0.0",
+    "study --out {tmp}/out --slopes 46": "must exceed tan",
+    "study --out {tmp}/out --rotor {tmp}/misspelt.toml": "did you mean 'radius'",
+    "study --out {tmp}/out --rotor {tmp}/gap.toml": "gap.csv",
+    "unknown": "unknown",
+    "": "COMMAND",
+}
+
+
+@pytest.mark.parametrize("line", BAD)
+def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "misspelt.toml").write_text(ROTOR.replace("radius", "radus"))
+    (tmp_path / "gap.toml").write_text(ROTOR)
+    (tmp_path / "gap.csv").write_text("alpha_deg,cl,cd\n-180,0,0\n0,,0.01\n180,0,0\n")
+    try:
+        code = main(line.format(tmp=tmp_path).split())
+    except SystemExit as stop:
+        code = stop.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert BAD[line] in printed.err
+
+
+ROTOR = """
+[rotor]
+name = "mine"
+blades = 2
+radius = 1.0
+root_cutout = 0.1
+chord = 0.1
+[airfoil]
+file = "gap.csv"
+[operating]
+rpm = 600.0
+collective_deg = 8.0
+"""
+
+
+def test_the_program_itself_needs_no_settings(tmp_path):
+    run = subprocess.run(
+        [sys.executable, "-m", "rotorjax.cli", "--version"], capture_output=True, text=True, cwd=tmp_path, check=True
+    )
+    assert run.stdout.startswith("rotorjax 0.")

@@ -1,0 +1,72 @@
+"""Every code block of the README does what it says, in a fresh copy of the repository."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+BLOCKS = re.findall(r"```(sh|python)\n(.*?)```", README, re.DOTALL)
+STUDY, TESTS, INFLOW, PYTHON = (text for _, text in BLOCKS)
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory):
+    """The files that git tracks or would, without anything that was built."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    folder = tmp_path_factory.mktemp("clone")
+    for name in listed.stdout.split("\n"):
+        if name and (ROOT / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+def sh(text, folder):
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "PYTEST"))}
+    return subprocess.run(["sh", "-euc", text], cwd=folder, env=clean, capture_output=True, text=True, check=False)
+
+
+def test_there_are_exactly_two_commands_to_begin_with():
+    assert [line for _, text in BLOCKS for line in text.splitlines() if "-m venv" in line] == [
+        STUDY.strip(),
+        TESTS.strip(),
+    ]
+
+
+def test_ci_runs_the_readmes_test_command():
+    assert TESTS.strip() in README
+    script = (ROOT / ".ci" / "run").read_text()
+    pattern = re.search(r'grep -E "(.*)" README.md', script)
+    assert pattern is not None
+    assert [line for line in README.splitlines() if re.search(pattern[1], line)] == [TESTS.strip()]
+
+
+@pytest.mark.slow
+def test_the_main_command_works_from_a_fresh_clone(clone):
+    run = sh(STUDY, clone)
+    assert run.returncode in (0, 1), run.stderr[-2000:]  # 1: a case did not converge, and the report says which
+    for name in ("report.md", "summary.json", "cases.nc", "fig06.png", "overview.png"):
+        assert (clone / "out" / name).exists()
+    inflow = sh(INFLOW, clone)
+    assert inflow.returncode == 0, inflow.stderr[-2000:]
+    assert (clone / "out" / "inflow.png").exists()
+
+
+def test_python_example(clone):
+    run = subprocess.run([sys.executable, "-c", PYTHON], cwd=clone, capture_output=True, text=True, check=True)
+    thrust, inflow = (float(word) for word in run.stdout.split())
+    assert 0.004 < thrust < 0.012
+    assert 0.02 < inflow < 0.08
+
+
+def test_files_that_the_readme_names_exist():
+    for name in re.findall(r"`((?:notebooks|rotorjax)/[\w./]+)`|\]\((docs/[\w.]+)\)", README):
+        assert (ROOT / (name[0] or name[1])).exists(), name
