@@ -10,6 +10,8 @@ The costates Δ obey the same equation with −[M]Δ̇: forward in time they gro
 of a window, where they start from their steady value; the start is forgotten after the transit time of the wake.
 """
 
+from functools import cache
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,7 @@ from rotorjax.potential.field import pressure_functions
 from rotorjax.potential.ground_source import correlation
 from rotorjax.potential.matrices import apparent_mass, damping, influence
 from rotorjax.potential.model import FiniteState, FiniteStateModel
+from rotorjax.potential.modes import ModeTable
 
 
 class RotorInputs(eqx.Module):
@@ -51,31 +54,58 @@ def mean_induced_inflow(a: Float[Array, " M"], model: FiniteStateModel) -> Float
     return 2 / np.sqrt(3) * a[model.modes.index(0, 1)]
 
 
+def _skew(a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel) -> Float[Array, ""]:
+    """X = tan(χ/2) = sin χ/(1 + cos χ) of the mean inflow of the first state, χ = atan(μ/λ)."""
+    through = inputs.climb + mean_induced_inflow(a, model)
+    below = _total_speed(inputs.mu, through) + jnp.abs(through)
+    return inputs.mu / jnp.where(below > 0, below, 1.0)
+
+
+def _unskewed(
+    a: Float[Array, " M"], vectors: Float[Array, "M ..."], inputs: RotorInputs, model: FiniteStateModel
+) -> Float[Array, "M ..."]:
+    """L⁻¹M vectors, the cosine and the sine modes on their own."""
+    mass, x = apparent_mass(model.modes, model.modes), _skew(a, inputs, model)
+    l = influence(model.modes, model.modes, x)
+    result = jnp.zeros_like(vectors)
+    for kind in ("cos", "sin"):
+        rows = np.array([i for i, mode in enumerate(model.modes.modes) if mode.kind == kind])
+        if rows.size:
+            block = np.ix_(rows, rows)
+            solved = jnp.linalg.solve(l[block], jnp.asarray(mass[block], a.dtype) @ vectors[rows])
+            result = result.at[rows].set(solved)
+    return result
+
+
+def mass_flow(
+    a: Float[Array, " M"], induced: Float[Array, ""], inputs: RotorInputs, model: FiniteStateModel
+) -> Float[Array, " M"]:
+    """Return the diagonal of V at the induced mean inflow λ_i = (2/√3)[L⁻¹Ma]_1, over ΩR."""
+    through = inputs.climb + induced
+    speed = _total_speed(inputs.mu, through)
+    if model.mass_flow == "linear":
+        return jnp.full_like(a, 1) * speed
+    later = (inputs.mu**2 + through * (through + induced)) / jnp.where(speed > 0, speed, 1.0)
+    return jnp.where(np.arange(len(model.modes)) == model.modes.index(0, 1), speed, later)
+
+
 def flow_matrices(
     a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel, skewed: bool = True
 ) -> tuple[Float[Array, " M"], Float[Array, "M M"]]:
     """Return the diagonal of V and L⁻¹M at the present mass flow and skew.
 
-    skewed=False leaves the wake straight (χ = 0), where L⁻¹M = 1 and no system is solved. The skew follows the mean
-    inflow of the first state, χ = atan(μ/λ); λ_i in the mass flow is that of L⁻¹Ma.
+    skewed=False leaves the wake straight (χ = 0), where L⁻¹M = 1 and no system is solved.
     """
-    first = model.modes.index(0, 1)
-    mass = jnp.asarray(apparent_mass(model.modes, model.modes), a.dtype)
-    through = inputs.climb + mean_induced_inflow(a, model)
+    inverse = jnp.eye(len(model.modes), dtype=a.dtype)
     if skewed:
-        speed = _total_speed(inputs.mu, through)
-        below = speed + jnp.abs(through)
-        x = inputs.mu / jnp.where(below > 0, below, 1.0)  # tan(χ/2) = sin χ/(1 + cos χ)
-        inverse = jnp.linalg.solve(influence(model.modes, model.modes, x), mass)
-        induced = 2 / np.sqrt(3) * inverse[first] @ a
-    else:
-        inverse, induced = jnp.eye(len(model.modes), dtype=a.dtype), mean_induced_inflow(a, model)
-    through = inputs.climb + induced
-    speed = _total_speed(inputs.mu, through)
-    if model.mass_flow == "linear":
-        return jnp.full_like(a, 1) * speed, inverse
-    later = (inputs.mu**2 + through * (through + induced)) / jnp.where(speed > 0, speed, 1.0)
-    return jnp.where(np.arange(len(model.modes)) == first, speed, later), inverse
+        inverse = _unskewed(a, inverse, inputs, model)
+    return mass_flow(a, mean_induced_inflow(inverse @ a, model), inputs, model), inverse
+
+
+@cache
+def _rate_table(modes: ModeTable) -> np.ndarray:
+    """M⁻¹D."""
+    return np.linalg.solve(apparent_mass(modes, modes), damping(modes, modes))
 
 
 @eqx.filter_jit
@@ -87,10 +117,9 @@ def rhs(
     Start from a state whose c is G a (`with_ground`). In skewed flow G still assumes the wake under the rotor.
     """
     del t
-    v, inverse = flow_matrices(state.a, inputs, model, skewed)
-    d, mass = (jnp.asarray(f(model.modes, model.modes), state.a.dtype) for f in (damping, apparent_mass))
-    rate = jnp.linalg.solve(mass, d @ (inputs.tau - v * (inverse @ state.a)))
-    return with_ground(rate, model)
+    a = _unskewed(state.a, state.a, inputs, model) if skewed else state.a
+    v = mass_flow(a, mean_induced_inflow(a, model), inputs, model)
+    return with_ground(jnp.asarray(_rate_table(model.modes), a.dtype) @ (inputs.tau - v * a), model)
 
 
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
