@@ -9,7 +9,7 @@ GOOD_AGREEMENT = (
 )
 OGE = Case()
 Verdict = tuple[bool | None, str]
-MISSING: Verdict = None, "the cases for it were not computed, or not all are sound"
+MISSING: Verdict = None, "the cases for it were not computed, or not all converged"
 
 
 @dataclass(frozen=True)

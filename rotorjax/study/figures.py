@@ -71,7 +71,7 @@ def loading_by_height(merged: xr.Dataset) -> Figure | None:
     figure = new_figure()
     axes = figure.add_subplot()
     for data, case, colour in _coloured(merged, cases):
-        axes.plot(data["radius"], data["free_wake_dct_dr"][0], color=colour, marker="o", label=case.label)
+        axes.plot(data["radius"], data["free_wake_dct_dr"][0], color=colour, marker="o", label=named(data, case))
     axes.set(xlabel=r"$r/R$", ylabel=LOADING, xlim=(0, 1), title="Free wake: loading over height")
     axes.legend()
     return figure
@@ -126,7 +126,8 @@ def inflow_of(case: Case, title: str) -> Draw:
                 look["label"] = "VPBFSM, three pressure terms"
             axes.plot(*across_disk(data, model, float(merged["reference_inflow"])), **look)
         diameter_axes(axes, INFLOW, sides=case.slope_deg > 0)
-        axes.set_title(title, pad=18 if case.slope_deg else 6)
+        warning = "" if bool(data["converged"]) else " (not converged)"
+        axes.set_title(title + warning, pad=18 if case.slope_deg else 6)
         legend_below(axes, 3)
         return figure
 
@@ -146,7 +147,7 @@ def inflow_series(model: str, pick: Callable[[xr.Dataset], Sequence[Case]], titl
         sloped = any(case.slope_deg for case in cases)
         diameter_axes(axes, INFLOW, sides=sloped)
         axes.set_title(title, pad=18 if sloped else 6)
-        legend_below(axes, 4)
+        legend_below(axes, 3 if sloped else 4)
         return figure
 
     return draw
@@ -157,7 +158,7 @@ def plot_series(axes: Axes, merged: xr.Dataset, model: str, cases: Sequence[Case
     marker = "o" if model == "free_wake" else None
     for data, case, colour in _coloured(merged, cases):
         line = across_disk(data, model, float(merged["reference_inflow"]))
-        axes.plot(*line, color=colour, marker=marker, label=case.label)
+        axes.plot(*line, color=colour, marker=marker, label=named(data, case))
 
 
 def loading_contours(pick: Callable[[xr.Dataset], Sequence[Case]], title: str) -> Draw:
@@ -181,7 +182,7 @@ def contours(merged: xr.Dataset, cases: Sequence[Case], title: str) -> Figure:
     for i, (case, field) in enumerate(zip(cases, fields, strict=True)):
         axes = figure.add_subplot(rows, columns, i + 1, projection="polar")
         filled = polar_contour(axes, merged["radius"].to_numpy(), merged["azimuth"].to_numpy(), field, levels)
-        axes.set_title(case.label, pad=10)
+        axes.set_title(named(merged.sel(case=case.name), case), pad=10)
         drawn.append(axes)
     figure.colorbar(filled, ax=drawn, label=LOADING, shrink=0.8, pad=0.06)  # type: ignore[arg-type]
     figure.suptitle(title)
@@ -201,7 +202,7 @@ def overview(merged: xr.Dataset) -> Figure | None:
     for model, look in MODEL_STYLE.items():
         axes.plot(*across_disk(merged.sel(case=sloped.name), model, float(merged["reference_inflow"])), **look)
     diameter_axes(axes, "", sides=True)
-    axes.set_title(sloped.label, pad=18)
+    axes.set_title(named(merged.sel(case=sloped.name), sloped), pad=18)
     legend_below(axes, 2)
     axes = figure.add_subplot(grid[2], projection="polar")
     field = merged.sel(case=sloped.name)["free_wake_dct_dr"].to_numpy()
@@ -216,7 +217,7 @@ def _overview_level(axes: Axes, merged: xr.Dataset, cases: Sequence[Case]) -> No
     """Free wake (points and lines) and VPBFSM (dashes) over height."""
     reference = float(merged["reference_inflow"])
     for data, case, colour in _coloured(merged, cases):
-        axes.plot(*across_disk(data, "free_wake", reference), color=colour, marker="o", label=case.label)
+        axes.plot(*across_disk(data, "free_wake", reference), color=colour, marker="o", label=named(data, case))
         axes.plot(*across_disk(data, "vpbfsm", reference), color=colour, linestyle="--")
     diameter_axes(axes, INFLOW)
     axes.set_title("Level ground: free wake (points), VPBFSM (dashes)", pad=18)
@@ -233,6 +234,11 @@ def _slopes(merged: xr.Dataset) -> list[Case]:
 
 def _steep(merged: xr.Dataset) -> list[Case]:
     return sorted((c for c in present(merged) if c.slope_deg == STEEP_DEG), key=lambda c: c.height or 0)
+
+
+def named(data: xr.Dataset, case: Case) -> str:
+    """Label of a case, with a warning where its wake did not converge: it is drawn as it was left."""
+    return case.label + ("" if bool(data["converged"]) else " (not converged)")
 
 
 def _with_data(merged: xr.Dataset, cases: Sequence[Case]) -> list[Case]:

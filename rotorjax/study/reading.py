@@ -38,8 +38,9 @@ class Reading:
         return self.merged["panel_width"].to_numpy()[0]
 
     def has(self, *cases: Case) -> bool:
-        """Whether all these cases have a sound solution of both models."""
-        return all(select(self.merged, case) is not None for case in cases)
+        """Whether all these cases converged and have a sound solution of both models."""
+        found = [select(self.merged, case) for case in cases]
+        return all(data is not None and bool(data["converged"]) for data in found)
 
     def level(self) -> list[Case]:
         """Level cases that are there, from the highest down."""

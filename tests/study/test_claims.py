@@ -82,3 +82,10 @@ def test_without_cases_nothing_is_claimed(merged):
 @pytest.mark.parametrize(("values", "expected"), [([3, 2, 1], True), ([3, 3], False), ([1], True)])
 def test_falls(values, expected):
     assert falls(values) is expected
+
+
+def test_cases_that_did_not_converge_bear_no_witness(merged):
+    lost = changed(merged, converged=lambda v, names: np.where(np.array(names) == "h1", 0.0, v))
+    assert level_claims.close_at(Case(1.0))(lost)[0] is None
+    assert Case(1.0) not in lost.level()
+    assert claims.converged(lost)[0] is False

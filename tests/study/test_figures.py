@@ -67,3 +67,11 @@ def test_levels_span_all_fields():
     assert levels[0] <= 0
     assert levels[-1] >= 3
     assert len(shared_levels([np.zeros(3)])) > 1
+
+
+def test_cases_that_did_not_converge_are_marked(merged):
+    lost = merged.assign(converged=merged["converged"] * (merged["case"] != "h2"))
+    figure = FIGURES["fig10a"](lost)
+    assert figure is not None
+    labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert [label for label in labels if "not converged" in label] == ["h = 2 (not converged)"]
