@@ -56,16 +56,21 @@ def evaluate(model: FreeWake, x: Unknowns) -> Evaluation:
     return Evaluation(state, velocities, blade_loads(model, velocities.control, inputs_of(model)), start)
 
 
-def advance(model: FreeWake, x: Unknowns) -> Unknowns:
-    """One pass of the fixed point: the wake that the velocities and loads of x produce."""
-    found = evaluate(model, x)
+def transported(model: FreeWake, found: Evaluation) -> Unknowns:
+    """The wake that given velocities and loads produce."""
     near, far = operators(model)
-    leading = jnp.broadcast_to(model.leading, (*x.near.shape[:2], 3))
+    velocities = found.velocities
+    leading = jnp.broadcast_to(model.leading, (*velocities.near.shape[:2], 3))
     return Unknowns(
-        near=solve_nodes(near, found.velocities.near, leading),
-        far=solve_nodes(far, found.velocities.far, found.start.points),
+        near=solve_nodes(near, velocities.near, leading),
+        far=solve_nodes(far, velocities.far, found.start.points),
         gamma_bound=lag(found.loads.circulation, model.settings.circulation_lag),
     )
+
+
+def advance(model: FreeWake, x: Unknowns) -> Unknowns:
+    """One pass of the fixed point: the wake that the velocities and loads of x produce."""
+    return transported(model, evaluate(model, x))
 
 
 def residual(x: Unknowns, model: FreeWake) -> Unknowns:

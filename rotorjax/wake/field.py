@@ -14,7 +14,7 @@ from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, 
 
 
 class Velocities(NamedTuple):
-    """Air velocity over ΩR in the slices' blade frames: control (K, R, 3), near (K, R+1, A_N, 3), far (K, F, A_F, 3)."""
+    """Air velocity over ΩR in the blades' frames: control (K, R, 3), near (K, R+1, A_N, 3), far (K, F, A_F, 3)."""
 
     control: Float[Array, "K R 3"]
     near: Float[Array, "K R1 AN 3"]

@@ -1,8 +1,10 @@
-"""A prescribed wake to start from (after Landgrebe 1972): contraction, two pitches, spreading over ground."""
+"""Guesses of the wake: a prescribed one (after Landgrebe 1972), and a solved one moved to another ground."""
 
 import jax.numpy as jnp
 import numpy as np
 
+from rotorjax.frames import rotate_about_shaft
+from rotorjax.ground import Plane
 from rotorjax.wake.equilibrium import Unknowns
 from rotorjax.wake.model import FreeWake
 
@@ -37,3 +39,34 @@ def prescribed(model: FreeWake, inflow: float = 0.055) -> Unknowns:
     far = np.stack([np.stack([s * radius * np.cos(age), -s * radius * np.sin(age), -depth], axis=-1) for s in spans])
     gamma = 0.36 * model.chords * np.sqrt(np.clip(1 - ((stations - 0.65) / 0.37) ** 2, 0, 1))
     return Unknowns(*(jnp.asarray(a, float)[None] for a in (near, far, gamma)))
+
+
+def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> Unknowns:
+    """Move a wake's nodes along as the ground rises and tilts: wholly at the ground, not at all at the rotor.
+
+    The guess that continuation needs: the wake of the old ground may lie under the new one.
+    """
+    if before is None or after is None:
+        return x
+    at = 2 * jnp.pi / x.near.shape[0] * jnp.arange(x.near.shape[0])[:, None, None]
+    tilt = after.slope - before.slope
+    down = jnp.array([0.0, 0.0, 1.0])
+
+    def move(nodes):
+        hub = rotate_about_shaft(nodes, at)
+        depth = 1 - before.distance(hub) / (before.height * jnp.cos(before.slope))
+        share = jnp.clip(depth, 0, 1)[..., None] ** 2
+        arm = hub + before.height * down
+        # the mountain side, x > 0, goes up
+        turned = jnp.stack(
+            [
+                jnp.cos(tilt) * arm[..., 0] - jnp.sin(tilt) * arm[..., 2],
+                arm[..., 1],
+                jnp.sin(tilt) * arm[..., 0] + jnp.cos(tilt) * arm[..., 2],
+            ],
+            axis=-1,
+        )
+        moved = hub + share * (turned - arm + (before.height - after.height) * down)
+        return rotate_about_shaft(moved, -at)
+
+    return x._replace(near=move(x.near), far=move(x.far))

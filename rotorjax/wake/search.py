@@ -1,0 +1,127 @@
+"""The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from rotorjax.ground import Plane
+from rotorjax.ode.anderson import anderson
+from rotorjax.ode.continuation import Branch, continuation
+from rotorjax.ode.linear import Krylov
+from rotorjax.ode.newton import newton
+from rotorjax.ode.outcome import Outcome
+from rotorjax.wake.equilibrium import Unknowns, advance, residual
+from rotorjax.wake.model import FreeWake
+from rotorjax.wake.start import prescribed, with_the_ground
+
+Progress = Callable[[str, float], None]
+
+WASHOUT = 0.08
+"""Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
+
+
+@dataclass
+class Search:
+    """The way so far: whether it still goes on, why it ended, and what it took."""
+
+    tol: float
+    progress: Progress | None
+    ok: bool = True
+    why: str = ""
+    iterations: int = 0
+    residuals: list[float] = field(default_factory=list)
+
+    def from_nothing(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
+        """Wake of a model without ground, by way of the auxiliary flow."""
+        washed = with_washout(model, WASHOUT)
+        guess = prescribed(model, WASHOUT + 0.03)
+        first = anderson(_pass, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80)
+        self.note("prescribed wake", first)
+        if not np.isfinite(first.residual):
+            self.ok, self.why = False, f"the prescribed wake diverged: {first.why}"
+            return washed, first.x
+        return self.follow(lambda s: with_washout(model, WASHOUT * (1 - s)), first.x, "washout", 0.4)
+
+    def move(self, here: FreeWake, there: FreeWake, x: Unknowns, stage: str) -> tuple[FreeWake, Unknowns]:
+        """Follow the branch from one model to another of the same structure."""
+        same = all(bool(jnp.all(a == b)) for a, b in zip(_leaves(here), _leaves(there), strict=True))
+        if same:
+            return self.settle(there, x)
+
+        def between(s):
+            model = jax.tree.map(lambda a, b: a + s * (b - a) if eqx.is_inexact_array(a) else b, here, there)
+            if here.ground is None or there.ground is None:
+                return model
+            # even steps in 1/h: the ground's effect goes with it
+            height = 1 / ((1 - s) / here.ground.height + s / there.ground.height)
+            return eqx.tree_at(lambda m: m.ground.height, model, height)
+
+        return self.follow(between, x, stage, 1.0)
+
+    def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
+        """Newton at the model itself."""
+        found = self.newton(model, x, self.tol)
+        self.note("case", found)
+        self.ok, self.why = found.converged, found.why
+        return model, found.x
+
+    def follow(self, at: Callable[[float], FreeWake], x: Unknowns, stage: str, first: float):
+        """Continuation over s from 0 to 1 with the model at(s)."""
+
+        def step(guess, s, memory):
+            found = self.newton(at(s), guess, self.tol if s == 1 else max(self.tol, 1e-5))
+            self.note(f"{stage} {s:.2f}", found)
+            return found
+
+        def carry(x, here, there):
+            return with_the_ground(x, at(here).ground, at(there).ground)
+
+        branch: Branch = continuation(
+            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=0.02, easy=5, jump=0.3, carry=carry
+        )
+        if not branch.outcomes:
+            self.ok, self.why = False, branch.why
+            return at(0.0), x
+        reached = branch.parameters[-1]
+        self.ok, self.why = branch.reached, branch.last.why if branch.reached else f"{stage}: {branch.why}"
+        return at(reached), branch.last.x
+
+    def newton(self, model: FreeWake, x: Unknowns, tol: float) -> Outcome:
+        """Newton-Krylov at one model."""
+        return newton(residual, x, model, linear=Krylov(forcing=0.03), tol=tol, max_iterations=8)
+
+    def note(self, stage: str, found: Outcome) -> None:
+        """Count a step and show it."""
+        self.iterations += found.iterations
+        self.residuals.extend(found.residuals)
+        if self.progress is not None:
+            self.progress(stage, found.residual)
+
+
+def over_distant_ground(model: FreeWake) -> FreeWake:
+    """The model over level ground so far down that the wake out of ground effect is a good guess."""
+    ground = model.ground
+    assert ground is not None
+    level = Plane(jnp.maximum(3.0, 1.5 * ground.height), jnp.zeros_like(ground.slope))
+    return eqx.tree_at(lambda m: m.ground, model, level)
+
+
+def with_washout(model: FreeWake, washout: float) -> FreeWake:
+    """The model in an auxiliary flow, its collective raised by the flow's angle at 0.75 R so that the loading stays."""
+    return eqx.tree_at(
+        lambda m: (m.washout, m.operating.collective),
+        model,
+        (jnp.asarray(washout, float), model.operating.collective + washout / 0.75),
+    )
+
+
+def _leaves(model: FreeWake) -> list:
+    return jax.tree.leaves(eqx.filter(model, eqx.is_inexact_array))
+
+
+def _pass(x: Unknowns, model: FreeWake) -> Unknowns:
+    return advance(model, x)

@@ -1,0 +1,31 @@
+"""A coarse UH-60 wake that compiles and solves in seconds."""
+
+import pytest
+
+from rotorjax.rotor.catalogue import load
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.solution import solve
+
+COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 3.0, "closure_turns": 3}
+
+
+@pytest.fixture(scope="session")
+def uh60():
+    return load("uh60")
+
+
+@pytest.fixture(scope="session")
+def coarse():
+    return wake_settings(**COARSE, azimuths=4)
+
+
+@pytest.fixture(scope="session")
+def coarse_slope():
+    """Eight azimuths: four hold no second harmonic."""
+    return wake_settings(**COARSE, azimuths=8)
+
+
+@pytest.fixture(scope="session")
+def hover(uh60, coarse):
+    return solve(free_wake(*uh60, None, coarse))

@@ -1,0 +1,52 @@
+"""Settings refuse what cannot be, and say what can."""
+
+import pytest
+
+from rotorjax.errors import InputError
+from rotorjax.ground import plane
+from rotorjax.operating import operating_point
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.settings import quick_settings, wake_settings
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("panels", 2),
+        ("panels", 6.5),
+        ("age_step_deg", 7.0),
+        ("age_step_deg", -15.0),
+        ("near_wake_deg", 40.0),
+        ("free_turns", 1.0),
+        ("roll_up", "none"),
+        ("inboard", (1.2,)),
+        ("inboard", (0.5, 0.4)),
+        ("tip_core", 0.0),
+        ("inboard_decay", -1.0),
+        ("sharpness", float("nan")),
+    ],
+)
+def test_bad_values_are_named(name, value):
+    with pytest.raises(InputError, match=f"`{name}`"):
+        wake_settings(**{name: value})
+
+
+def test_counts_follow_from_angles():
+    settings = wake_settings(age_step_deg=15.0, near_wake_deg=60.0, free_turns=3.5, inboard=(0.4,))
+    assert (settings.near_ages, settings.far_ages, settings.steps_per_turn, settings.filaments) == (4, 84, 24, 2)
+
+
+def test_quick_settings_are_coarser_and_can_be_overridden():
+    assert quick_settings().panels < wake_settings().panels
+    assert quick_settings(panels=9).panels == 9
+
+
+def test_climb_over_ground_is_refused(uh60):
+    rotor, _ = uh60
+    with pytest.raises(InputError, match="climb"):
+        free_wake(rotor, operating_point(27.0, climb=1.0), plane(1.0))
+
+
+def test_azimuths_have_to_suit_the_blades(uh60):
+    with pytest.raises(InputError, match="azimuths"):
+        free_wake(*uh60, None, wake_settings(azimuths=10))

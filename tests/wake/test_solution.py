@@ -1,0 +1,72 @@
+"""The periodic wake: it is one, it is where rhs rests, and it behaves as rotors do."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.ground import plane
+from rotorjax.wake.dynamics import inputs_of, rhs
+from rotorjax.wake.equilibrium import spread
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.solution import solve
+
+
+def test_hover_converges_to_a_rotor_in_hover(hover):
+    assert hover.converged, hover.why
+    assert hover.residual < 1e-6
+    assert hover.load_change < 1e-5
+    # momentum theory: no settings bring a hovering wake far from it
+    np.testing.assert_allclose(hover.mean_inflow, np.sqrt(hover.CT / 2), rtol=0.12)
+    assert hover.CP_profile > 0
+    # the tip vortex contracts and goes down
+    end = hover.tip_vortex[0, -1]
+    assert 0.6 < np.hypot(*end[:2]) < 0.95
+    assert end[2] < -0.5
+
+
+def test_the_periodic_wake_is_where_the_marched_equations_rest(hover):
+    inputs = inputs_of(hover.model)
+    for slices in (1, 4):
+        rate = rhs(0.3, spread(hover.state, slices), inputs, hover.model)
+        assert max(float(jnp.max(jnp.abs(a))) for a in jax.tree.leaves(rate)) < 1e-5
+
+
+@pytest.fixture(scope="module")
+def grounded(uh60, coarse, hover):
+    return solve(free_wake(*uh60, plane(1.0), coarse), start=hover)
+
+
+def test_ground_raises_thrust_and_lowers_inflow(hover, grounded):
+    assert grounded.converged, grounded.why
+    assert grounded.CT > hover.CT
+    assert grounded.mean_inflow / np.sqrt(grounded.CT) < hover.mean_inflow / np.sqrt(hover.CT)
+    assert grounded.ground_normal_velocity_rms < 1e-10
+
+
+def test_wake_spreads_over_the_ground_and_stays_above_it(grounded):
+    path = grounded.tip_vortex[0]
+    radius = np.hypot(path[:, 0], path[:, 1])
+    assert radius[-1] > radius.min() + 0.1
+    assert float(jnp.min(grounded.model.ground.distance(grounded.state.far))) > 0
+    assert float(jnp.min(grounded.model.ground.distance(grounded.state.near))) > 0
+
+
+@pytest.mark.slow
+def test_slope_lowers_inflow_on_the_mountain_side(uh60, coarse_slope, grounded):
+    found = solve(free_wake(*uh60, plane(1.0, 4.0), coarse_slope), start=grounded)
+    assert found.converged, found.why
+    assert found.ground_normal_velocity_rms < 1e-10
+    towards = found.inflow @ (found.r * found.widths)
+    # slices at ψ = 0 (mountain), 45 … 180 (valley)
+    assert towards[0] < towards[4]
+
+
+def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover):
+    rotor, operating = uh60
+    upside_down = eqx.tree_at(lambda o: o.collective, operating, jnp.asarray(-0.6))
+    found = solve(free_wake(rotor, upside_down, None, coarse), start=hover)
+    assert not found.converged
+    assert found.why
+    assert np.all(np.isfinite(found.inflow))
