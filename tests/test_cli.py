@@ -41,7 +41,7 @@ def test_study_writes_everything_and_says_where(tmp_path, solver, capsys):
         "fig06.png",
         "fig12.pdf",
     }
-    assert sorted(p.stem for p in (out / "cases").iterdir()) == ["h0.75", "h1", "h1-slope15", "h2", "oge"]
+    assert sorted(p.stem for p in (out / "cases").iterdir()) == ["h1", "h1-slope15", "h1.5", "h2", "oge"]
 
 
 def test_a_diverged_case_gives_exit_code_1(tmp_path, solver, capsys):

@@ -11,7 +11,7 @@ HEIGHTS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 SLOPES_DEG = (5.0, 8.0, 10.0, 15.0, 30.0, 40.0)
 SLOPE_HEIGHT = 1.0  # where all slopes are computed
 STEEP_DEG, STEEP_HEIGHTS = 30.0, (1.5, 0.9)  # the slope that is also computed at other heights
-QUICK_HEIGHTS = (0.75, 1.0, 2.0)
+QUICK_HEIGHTS = (1.0, 1.5, 2.0)
 QUICK_SLOPES_DEG = (15.0,)
 
 

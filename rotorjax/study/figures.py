@@ -191,7 +191,7 @@ def contours(merged: xr.Dataset, cases: Sequence[Case], title: str) -> Figure:
 
 def overview(merged: xr.Dataset) -> Figure | None:
     """The study at a glance: both models' inflow over height and on a slope, and the loading there."""
-    level = [case for case in (Case(), Case(2.0), Case(1.0), Case(0.75)) if select(merged, case) is not None]
+    level = [case for case in (Case(), Case(2.0), Case(1.0), Case(0.5)) if select(merged, case) is not None]
     sloped = Case(1.0, 15.0)
     if len(level) < 2 or select(merged, sloped) is None:
         return None

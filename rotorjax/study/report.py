@@ -20,7 +20,7 @@ TABLE_R = (0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.95)
 
 
 def report(merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wall_time_s: float) -> str:
-    """The report in Markdown. drawn, missing: figures that were and were not drawn; wall_time_s: of the whole study."""
+    """The report in Markdown. drawn, missing: figures that were and were not drawn; wall_time_s: of this run."""
     reading = Reading(merged)
     parts = [
         "# Rotor inflow in ground effect: free vortex wake and VPBFSM",
@@ -51,8 +51,9 @@ def _introduction(merged: xr.Dataset, wall_time_s: float) -> str:
         "induced, positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
         f"{float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, 90° the "
         "advancing, 180° the valley, 270° the retreating side.\n\n"
-        f"{len(merged['case'])} cases, {wall_time_s:.0f} s, of which {float(merged['compile_time_s'].sum()):.0f} s "
-        f"compiling the free wake; peak memory {peak_memory_gb():.2f} GB. "
+        f"{len(merged['case'])} cases. This run took {wall_time_s:.0f} s, with finished cases taken as they were found; "
+        f"the wakes took {float(merged['wall_time_s'].sum()):.0f} s when they were solved, two at a time. Peak memory "
+        f"{peak_memory_gb():.2f} GB. "
     )
     if not failed:
         return text + "All cases converged."
