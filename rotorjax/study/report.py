@@ -51,7 +51,7 @@ def _introduction(merged: xr.Dataset, wall_time_s: float) -> str:
         "induced, positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
         f"{float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, 90° the "
         "advancing, 180° the valley, 270° the retreating side.\n\n"
-        f"{len(merged['case'])} cases. This run took {wall_time_s:.0f} s, with finished cases taken as they were found; "
+        f"{len(merged['case'])} cases. This run took {wall_time_s:.0f} s, finished cases taken as they were found; "
         f"the wakes took {float(merged['wall_time_s'].sum()):.0f} s when they were solved, two at a time. Peak memory "
         f"{peak_memory_gb():.2f} GB. "
     )
