@@ -179,4 +179,4 @@ def wake_settings(
 
 def quick_settings(**overrides) -> WakeSettings:
     """Coarser settings for a first look: fewer panels, turns and azimuths."""
-    return wake_settings(**{"panels": 10, "free_turns": 3.0, "closure_turns": 3, "azimuths": 8} | overrides)
+    return wake_settings(**{"panels": 12, "free_turns": 3.0, "closure_turns": 3, "azimuths": 8} | overrides)
