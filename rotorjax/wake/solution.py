@@ -88,8 +88,7 @@ def solve(
     """Find the periodic wake of a model, from a prescribed wake or from the solution of a neighbouring case.
 
     start: a solution with the same rotor and settings; used where both have ground, or neither. progress(stage,
-    residual) is called after each continuation step. tol: relative rms of the residual to aim at; where Newton's method
-    stalls above it but below search.ACCEPTED, the wake is accepted and `why` says so. A solve that does not get there
+    residual) is called after each continuation step. tol: relative rms of the residual. A solve that does not get there
     comes back with `converged` False, the reason, and the last good state.
     """
     clock = Clock()
