@@ -1,0 +1,135 @@
+"""Hayden's factor, and the factor b^{η^p} fitted to it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.calibration import hayden
+from rotorjax.calibration.fit import calibrate, calibrate_many, even_starts
+from rotorjax.errors import InputError
+from rotorjax.ground import plane
+from rotorjax.potential import loading
+from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
+
+
+@pytest.fixture(scope="module")
+def both():
+    data, parameters = hayden.hayden_data()
+    return data, parameters, calibrate(hayden.residual, parameters, data)
+
+
+def test_hayden_factor_is_the_published_one():
+    np.testing.assert_allclose(
+        hayden.hayden_factor(jnp.asarray(hayden.HEIGHTS)), [0.625, 0.792, 0.874, 0.943, 0.970, 0.991], atol=6e-4
+    )
+    assert hayden.hayden_factor(jnp.asarray(6.0)) == 1.0  # the printed formula exceeds 1 from z = 4.53 R
+    assert abs(1 / (0.9926 + 0.0379 * (2 / hayden.HIGHEST) ** 2) - 1) < 2e-5
+
+
+def test_one_azimuth_of_the_quadrature_is_exact():
+    """The ratio is that of the model as users make it, at several heights and three pressure terms."""
+    data, _ = hayden.hayden_data((0.5, 2.0), shape="triangular")
+    ours = hayden.inflow_ratio(data, jnp.asarray(0.3), jnp.asarray(1.5))
+    free = finite_state_model()
+    alone = mean_inflow(steady_state(free, data.tau[0]), free)
+    for height, ratio in zip((0.5, 2.0), ours, strict=True):
+        model = finite_state_model(plane(height), b=0.3, p=1.5)
+        np.testing.assert_allclose(mean_inflow(steady_state(model, data.tau[0]), model) / alone, ratio, rtol=1e-9)
+
+
+def test_printed_factor_is_far_from_hayden():
+    data, _ = hayden.hayden_data((1.0,), ("b",))
+    printed = hayden.residual(jnp.array([np.pi / 7]), data) + data.targets
+    assert printed[0] == pytest.approx(0.699, abs=6e-4)  # computed independently with the trapezoidal rule
+
+
+def test_b_alone_at_one_height_is_the_same_from_every_start():
+    data, parameters = hayden.hayden_data((1.0,), ("b",))
+    many = calibrate_many(hayden.residual, parameters, data, np.linspace(0.05, 0.95, 5)[:, None])
+    assert np.ptp(many.values) < 1e-6
+    assert many.converged.all()
+    ratio = hayden.inflow_ratio(data, jnp.asarray(many.values[0, 0]), jnp.asarray(2.0))
+    np.testing.assert_allclose(ratio, 1 / (0.9926 + 0.0379 * 4), atol=1e-6)
+
+
+def test_two_parameters_follow_hayden_over_six_heights(both):
+    data, parameters, fit = both
+    printed = jnp.sqrt(jnp.mean(hayden.residual(jnp.asarray(parameters.printed), data) ** 2))
+    assert fit.converged, fit.why
+    assert fit.rms <= 0.02 < 0.15 < printed
+    assert np.all(np.linalg.eigvalsh(fit.covariance) > 0)
+
+
+@pytest.mark.parametrize("method", ["lbfgs", "adam"])
+def test_drivers_agree(both, method):
+    data, parameters, fit = both
+    other = calibrate(hayden.residual, parameters, data, method=method)
+    assert other.converged, other.why
+    np.testing.assert_allclose(other.values, fit.values, atol=1e-4)
+
+
+def test_covariance_is_the_spread_over_disturbed_targets(both):
+    """Targets with random errors of the fit's own size, refitted: the spread of b and p is what the Jacobian says."""
+    data, _, fit = both
+    sigma = fit.rms * np.sqrt(6 / 4)
+    errors = sigma * np.random.default_rng(1).standard_normal((200, 6))
+    exact = hayden.residual(jnp.asarray(fit.values), data)
+
+    def disturbed(error):
+        return np.asarray(fit.values) - np.linalg.lstsq(jacobian, np.asarray(error), rcond=None)[0]
+
+    jacobian = np.asarray(jax.jacrev(hayden.residual)(jnp.asarray(fit.values), data))
+    np.testing.assert_allclose(jacobian.T @ np.asarray(exact), 0, atol=1e-6)  # the end is a minimum
+    spread = np.cov(np.array([disturbed(e) for e in errors]).T)
+    np.testing.assert_allclose(np.sqrt(np.diag(spread)), fit.deviations, rtol=0.15)
+
+
+def test_every_start_ends_at_the_same_place(both):
+    data, parameters, fit = both
+    many = calibrate_many(hayden.residual, parameters, data, even_starts(parameters, 64))
+    np.testing.assert_allclose(many.values, np.tile(fit.values, (64, 1)), atol=1e-5)
+    assert many.converged.all()
+
+
+def test_measured_loads_are_brought_to_one_thrust():
+    data, _ = hayden.hayden_data((1.0, 2.0), ("b",), shape="triangular")
+    tau = np.asarray(data.tau)
+    scaled, _ = hayden.hayden_data((1.0, 2.0), ("b",), tau=(tau * np.array([[1.3], [0.8]]), tau[0]))
+    b, p = jnp.asarray(0.2), jnp.asarray(2.0)
+    np.testing.assert_allclose(hayden.inflow_ratio(scaled, b, p), hayden.inflow_ratio(data, b, p), rtol=1e-12)
+    modes = data.model.modes
+    thrust = [loading.thrust_coefficient(t, modes) for t in scaled.tau]
+    np.testing.assert_allclose(thrust, loading.thrust_coefficient(jnp.asarray(tau[0]), modes), rtol=1e-12)
+
+
+BAD = {
+    r"in \[0.3, 4.53\] \(over R\), where Hayden's factor holds, but holds 0.2": ((0.2,),),
+    "but holds 5": ((1.0, 5.0),),
+    "but holds nan": ((float("nan"),),),
+    "at least one height": ((),),
+    "must not repeat": ((1.0, 1.0),),
+    "but holds 'q'": ((1.0,), ("b", "q")),
+    "`shape` must be one of": ((1.0,), ("b",), "square"),
+    "positive thrust": ((1.0,), ("b",), "elliptic", (np.array([[-1.0]]), np.array([1.0]))),
+    "must have shapes": ((1.0,), ("b",), "elliptic", (np.array([[1.0, 0.0]]), np.array([1.0]))),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_bad_input_is_named(message):
+    with pytest.raises(InputError, match=message):
+        hayden.hayden_data(*BAD[message])
+
+
+def test_targets_out_of_reach_are_refused():
+    """With so much load on τ₃ the model's ground effect is too strong for Hayden's factor at any b."""
+    tau = np.array([[1e-3, 2e-3, 0.0]])
+    with pytest.raises(InputError, match=r"where the model can reach Hayden's factor, but at 0\.5"):
+        hayden.hayden_data((0.5,), ("b",), tau=(tau, tau[0]))
+
+
+def test_more_parameters_than_heights_are_refused():
+    data, parameters = hayden.hayden_data((1.0,))
+    with pytest.raises(InputError, match="there are 2"):
+        calibrate(hayden.residual, parameters, data)
