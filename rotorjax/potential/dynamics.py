@@ -20,9 +20,8 @@ from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.potential.field import pressure_functions
-from rotorjax.potential.ground_source import correlation
 from rotorjax.potential.matrices import apparent_mass, damping, influence
-from rotorjax.potential.model import FiniteState, FiniteStateModel
+from rotorjax.potential.model import FiniteState, FiniteStateModel, ground_matrix
 from rotorjax.potential.modes import ModeTable
 
 
@@ -103,8 +102,8 @@ def flow_matrices(
 
 
 @cache
-def _rate_table(modes: ModeTable) -> np.ndarray:
-    """M⁻¹D."""
+def rate_table(modes: ModeTable) -> np.ndarray:
+    """Return M⁻¹D, (M, M)."""
     return np.linalg.solve(apparent_mass(modes, modes), damping(modes, modes))
 
 
@@ -119,14 +118,14 @@ def rhs(
     del t
     a = _unskewed(state.a, state.a, inputs, model) if skewed else state.a
     v = mass_flow(a, mean_induced_inflow(a, model), inputs, model)
-    return with_ground(jnp.asarray(_rate_table(model.modes), a.dtype) @ (inputs.tau - v * a), model)
+    return with_ground(jnp.asarray(rate_table(model.modes), a.dtype) @ (inputs.tau - v * a), model)
 
 
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
     """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
     if model.ground is None:
         return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
+    return FiniteState(a, ground_matrix(model, model.ground) @ a)
 
 
 @eqx.filter_jit

@@ -5,6 +5,9 @@ d = h − x tan δ below the rotor's point (x, y) (Eq. 9; x aft). Both maps use 
 ground's (x, y) at depth d, and the ground's flow reaches the rotor's (x, y) from the distance d. Only the normal
 component of the incoming flow, cos δ times the axial one, meets the sources; the tangential one slides along the plane.
 
+Over a part of the plane (`region`) the condition holds on that part only, by least squares; odd sources suit it best,
+whose flow through the plane is zero off their disk. The ground disk may have another radius than the rotor.
+
 The integrals of Eq. 37 are taken with Gauss–Legendre nodes in ν and equal steps in ψ instead of the recommended
 trapezoidal rule: the integrands are analytic in ν and periodic in ψ, so both rules converge faster than any power,
 and a few dozen nodes reach rounding error where 400 trapezoidal points do not
@@ -22,6 +25,9 @@ from rotorjax.ground import Plane
 from rotorjax.potential.ellipsoidal import ellipsoidal
 from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions
 from rotorjax.potential.modes import ModeTable
+from rotorjax.potential.region import Region
+
+OFF_REGION = 0.1  # weight of the condition "no source" off the region against that of the flow on it
 
 
 class Correction(eqx.Module):
@@ -104,3 +110,24 @@ def correlation(rotor: ModeTable, sources: ModeTable, ground: Plane, quadrature:
     x, y, _, weights = (jnp.asarray(v, dtype) for v in quadrature.rule())
     share = jnp.where(sources.m == 0, 1.0, 2.0).astype(dtype)[:, None]
     return share * (self_flow(sources, x, y) * weights) @ rotor_on_ground(rotor, ground, x, y).T
+
+
+def source_solver(
+    sources: ModeTable, quadrature: DiskQuadrature, region: Region | None = None, radius: Float[Array, ""] | None = None
+) -> Float[Array, "G N"]:
+    """Return the matrix from normal velocities at the N quadrature points of the ground disk to the source states.
+
+    radius: of the ground disk, over R (None: 1). The states are the least-squares solution of S c = w on the region and
+    S c = 0 off it, with `OFF_REGION` as weight there; where the mask is between, S c = mask · w. Without region it is
+    the projection of `correlation`, and so it is where the region covers the disk; where it covers nothing the result
+    is zero.
+    """
+    x, y, _, weights = quadrature.rule()
+    share = jnp.where(sources.m == 0, 1.0, 2.0)[:, None]
+    own = self_flow(sources, jnp.asarray(x), jnp.asarray(y))
+    if region is None:
+        return share * own * weights
+    size = 1.0 if radius is None else radius
+    mask = region.mask(size * jnp.asarray(x), size * jnp.asarray(y))
+    demand = weights * (mask + OFF_REGION * (1 - mask))
+    return jnp.linalg.solve((own * demand) @ own.T, own * (demand * mask))

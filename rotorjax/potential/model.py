@@ -26,9 +26,11 @@ from rotorjax.potential.ground_source import (
     ground_on_rotor,
     rotor_on_ground,
     self_flow,
+    source_solver,
 )
 from rotorjax.potential.loading import thrust_coefficient
 from rotorjax.potential.modes import ModeTable, ground_modes, rotor_modes
+from rotorjax.potential.region import Region
 
 MassFlow = Literal["paper", "linear"]
 
@@ -38,7 +40,8 @@ class FiniteStateModel(eqx.Module):
 
     modes: rotor table, M modes; sources: ground table, G modes (static). ground: `Plane` or None. correction: b and
     p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). mass_flow (static):
-    "paper" gives V to a_1^0 and 2V to all others (Eq. 4); "linear" gives V to all.
+    "paper" gives V to a_1^0 and 2V to all others (Eq. 4); "linear" gives V to all. region: the part of the plane where
+    there is ground, None for all of it. ground_radius (): of the ground disk, over R, None for 1.
     """
 
     modes: ModeTable
@@ -47,6 +50,8 @@ class FiniteStateModel(eqx.Module):
     correction: Correction
     quadrature: DiskQuadrature
     mass_flow: MassFlow = eqx.field(static=True)
+    region: Region | None = None
+    ground_radius: Float[Array, ""] | None = None
 
 
 class FiniteState(eqx.Module):
@@ -68,18 +73,23 @@ def finite_state_model(
     ground_parity: Literal["even", "odd"] = "even",
     even_terms: int = 0,
     quadrature: DiskQuadrature | None = None,
+    region: Region | None = None,
+    ground_radius: float | None = None,
 ) -> FiniteStateModel:
     """Make the model; its defaults are the paper's for level ground (τ₁, τ₃, τ₅; b^{η^p} with π/7 and 2).
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
     terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only); even_terms: see
-    `modes.rotor_modes`, for dynamics. Raises
-    InputError where a count, b, p, mass_flow or ground_parity is not allowed.
+    `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground (`rotorjax.potential.region`,
+    best with ground_parity "odd", ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk, 1
+    by default. Raises InputError where a count, b, p, mass_flow, ground_parity or ground_radius is not allowed.
     """
     if mass_flow not in get_args(MassFlow):
         raise InputError(f"Argument `mass_flow` must be one of {get_args(MassFlow)}, but is {mass_flow!r}")
     if ground_parity not in ("even", "odd"):
         raise InputError(f"Argument `ground_parity` must be 'even' or 'odd', but is {ground_parity!r}")
+    if ground_radius is not None and not (np.isfinite(ground_radius) and ground_radius > 0):
+        raise InputError(f"Argument `ground_radius` must be positive and finite (over R), but is {ground_radius}")
     quadrature = quadrature or DiskQuadrature()
     least = 2 * max(harmonics, ground_harmonics) + 1
     if quadrature.nodes_psi < least:
@@ -91,7 +101,33 @@ def finite_state_model(
         correction(b, p),
         quadrature,
         mass_flow,
+        region,
+        None if ground_radius is None else jnp.asarray(ground_radius, float),
     )
+
+
+def footprint(model: FiniteStateModel) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """Return the stations (x, y) of the ground disk's quadrature points, over R."""
+    x, y, _, _ = model.quadrature.rule()
+    size = 1.0 if model.ground_radius is None else model.ground_radius
+    return size * jnp.asarray(x), size * jnp.asarray(y)
+
+
+def ground_matrix(model: FiniteStateModel, ground: Plane) -> Float[Array, "G M"]:
+    """Return G of c = G a (Eq. 36) for the model's region and ground disk over a plane."""
+    if model.region is None and model.ground_radius is None:
+        return correlation(model.modes, model.sources, ground, model.quadrature)
+    x, y = footprint(model)
+    solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)
+    return solver @ rotor_on_ground(model.modes, ground, x, y).T
+
+
+def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "G ..."]:
+    """Return the upward velocity of unit ground states at hub-frame points above a plane (Eqs. 35, 46)."""
+    if model.ground_radius is None:
+        return ground_on_rotor(model.sources, ground, model.correction, points)
+    shrunk = Plane(ground.height / model.ground_radius, ground.slope)
+    return ground_on_rotor(model.sources, shrunk, model.correction, points / model.ground_radius)
 
 
 def mass_flow_parameters(model: FiniteStateModel, tau: Float[Array, " M"]) -> Float[Array, " M"]:
@@ -116,7 +152,7 @@ def steady_state(model: FiniteStateModel, tau: Float[Array, " M"]) -> FiniteStat
     a = tau / mass_flow_parameters(model, tau)
     if model.ground is None:
         return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
+    return FiniteState(a, ground_matrix(model, model.ground) @ a)
 
 
 def disk_inflow(
@@ -127,7 +163,7 @@ def disk_inflow(
     if model.ground is None:
         return down
     points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
-    return down - jnp.tensordot(state.c, ground_on_rotor(model.sources, model.ground, model.correction, points), 1)
+    return down - jnp.tensordot(state.c, ground_upflow(model, model.ground, points), 1)
 
 
 @eqx.filter_jit
@@ -139,7 +175,7 @@ def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStat
     """
     rotor = jnp.tensordot(state.a, field_functions(model.modes, points), [[0], [1]])
     if model.ground is not None:
-        up = jnp.tensordot(state.c, ground_on_rotor(model.sources, model.ground, model.correction, points), 1)
+        up = jnp.tensordot(state.c, ground_upflow(model, model.ground, points), 1)
         rotor = rotor.at[2].add(up)
     return jnp.moveaxis(rotor, 0, -1)
 
@@ -161,13 +197,22 @@ def mean_inflow(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]
 
 @eqx.filter_jit
 def ground_normal_velocity_rms(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
-    """Return the rms of the normal velocity left on the plane over that of the flow into it, inside the wake radius.
+    """Return the rms of the normal velocity left on the plane over that of the flow into it, on the ground disk.
 
-    Area-weighted. Raises InputError where the model has no ground.
+    Area-weighted; with a region on that part of the disk, weighted by its mask. Raises InputError where the model has
+    no ground.
     """
     if model.ground is None:
         raise InputError("Argument `model` must have a ground, but its ground is None")
-    x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
+    x, y = footprint(model)
     into = state.a @ rotor_on_ground(model.modes, model.ground, x, y)
-    left = into - state.c @ self_flow(model.sources, x, y)
-    return jnp.sqrt(((nu * weights) @ left**2) / ((nu * weights) @ into**2))
+    return relative_residual(state.c, into, model)
+
+
+def relative_residual(c: Float[Array, " G"], into: Float[Array, " N"], model: FiniteStateModel) -> Float[Array, ""]:
+    """Return the rms of what source states c leave of the flow `into` the ground disk's points, over that flow's."""
+    x, y, nu, weights = (jnp.asarray(v, c.dtype) for v in model.quadrature.rule())
+    mask = jnp.ones_like(x) if model.region is None else model.region.mask(*footprint(model))
+    area = nu * weights * mask
+    left = mask * into - c @ self_flow(model.sources, x, y)
+    return jnp.sqrt((area @ left**2) / (area @ (mask * into) ** 2))

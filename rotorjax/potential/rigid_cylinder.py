@@ -63,6 +63,8 @@ def reflected_sink_downflow(
 def _ground(model: FiniteStateModel) -> Plane:
     if model.ground is None:
         raise InputError("Argument `model` must have a ground, but its ground is None")
+    if model.region is not None:
+        raise InputError("Argument `model` must have the whole plane as ground for the exact image, but has a region")
     return model.ground
 
 

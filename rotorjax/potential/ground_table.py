@@ -1,0 +1,227 @@
+"""The ground's response tabulated over height and slope (and a moving edge), for steps of some microseconds.
+
+What the ground does to the rotor is linear in the rotor's states, in those that its wake carries and in the plane's
+velocity; only the matrix depends on the geometry. It is computed at tensor Chebyshev nodes of the geometry (the square
+root of the height, the slope, the edge), split by symmetry into blocks that do not couple, and compressed by a singular
+value decomposition. The interpolation is smooth: derivatives by height, slope and place are those of the interpolant.
+
+Rows: the L coefficients of the upward flow on the rotor's disk in the functions P̄_j^r (j + r even) of `disk_modes`,
+which are complete there but for harmonics above the sources' own, which a slope makes and which bear no load. Columns:
+states at K + 1 nodes of the wake (one where it has no transit time), then the plane's velocity, uniform and by x. The
+source states themselves are those of `moving_ground.ground_states`.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.potential.field import disk_functions
+from rotorjax.potential.ground_source import rotor_on_ground, source_solver
+from rotorjax.potential.model import FiniteStateModel, footprint, ground_upflow
+from rotorjax.potential.modes import ModeTable, ground_modes
+from rotorjax.potential.region import HalfPlane
+from rotorjax.potential.wake_transport import WakeTransport, transported_flow
+
+
+class GroundTable(eqx.Module):
+    """Matrices over a box of parameters, (√height, slope) or (√height, slope, edge).
+
+    low, high (P,): the box, static. nodes: Chebyshev nodes for each parameter, static. rows, columns: what each block
+    holds, static; an index past the end is padding. amplitudes (prod nodes, Q): of the Q leading matrices at each node.
+    matrices (Q, blocks, rows, columns).
+    """
+
+    low: tuple[float, ...] = eqx.field(static=True)
+    high: tuple[float, ...] = eqx.field(static=True)
+    nodes: tuple[int, ...] = eqx.field(static=True)
+    rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    columns: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    size: tuple[int, int] = eqx.field(static=True)
+    amplitudes: Float[Array, "P Q"]
+    matrices: Float[Array, "Q B I J"]
+
+    def apply(self, parameters: Sequence[Float[Array, ""]], x: Float[Array, " C"]) -> Float[Array, " I"]:
+        """Return matrix · x at parameters inside the box (outside of it the nearest ones of the box)."""
+        basis = jnp.ones(1, x.dtype)
+        for value, low, high, count in zip(parameters, self.low, self.high, self.nodes, strict=True):
+            basis = (basis[:, None] * _cardinal(jnp.clip(value, low, high), low, high, count)).ravel()
+        blocks = jnp.tensordot(basis @ self.amplitudes, self.matrices, 1)
+        padded = jnp.append(x, 0.0)[np.array(self.columns)]
+        result = jnp.einsum("bij,bj->bi", blocks, padded).ravel()
+        return result[_inverse(self.rows, self.size[0])]
+
+
+def _cardinal(value: Float[Array, ""], low: float, high: float, count: int) -> Float[Array, " C"]:
+    """Weights of the values at `count` Chebyshev nodes of [low, high]."""
+    if count == 1:
+        return jnp.ones(1)
+    t = (2 * value - low - high) / (high - low)
+    rows = [jnp.ones_like(t), t]
+    for _ in range(count - 2):
+        rows.append(2 * t * rows[-1] - rows[-2])
+    node = np.polynomial.chebyshev.chebpts1(count)
+    inverse = np.linalg.inv(np.polynomial.chebyshev.chebvander(node, count - 1))
+    return jnp.stack(rows) @ jnp.asarray(inverse)
+
+
+def _inverse(rows: tuple[tuple[int, ...], ...], count: int) -> np.ndarray:
+    """Where in the flattened blocks each row's result lies."""
+    flat = np.array(rows).ravel()
+    place = np.zeros(count, int)
+    place[flat[flat < count]] = np.flatnonzero(flat < count)
+    return place
+
+
+def disk_modes(model: FiniteStateModel) -> ModeTable:
+    """Functions of the ground's flow on the rotor disk: the harmonics of the sources, six terms or as many as fit."""
+    harmonics = int(model.sources.m.max())
+    return ground_modes(harmonics, min(6, (15 - harmonics) // 2 + 1))
+
+
+def disk_projection(model: FiniteStateModel, ground: Plane) -> Float[Array, "L G"]:
+    """Return the matrix from source states to the coefficients of their upward flow on the rotor disk."""
+    x, y, _, weights = (jnp.asarray(v) for v in model.quadrature.rule())
+    modes = disk_modes(model)
+    share = jnp.where(modes.m == 0, 1.0, 2.0)[:, None]
+    flow = ground_upflow(model, ground, jnp.stack([x, y, jnp.zeros_like(x)], axis=-1))
+    return (share * disk_functions(modes, x, y) * weights) @ flow.T
+
+
+def flow_matrix(model: FiniteStateModel, ground: Plane, transport: WakeTransport | None) -> Float[Array, "N C"]:
+    """Return the flow into the plane at the ground disk's points of each column."""
+    x, y = footprint(model)
+    if transport is None:
+        flow = rotor_on_ground(model.modes, ground, x, y).T
+    else:
+        flow = jnp.moveaxis(transported_flow(model, transport, ground, x, y), 1, 2).reshape(x.size, -1)
+    return jnp.concatenate([flow, jnp.ones_like(x)[:, None], x[:, None]], axis=1)
+
+
+def response(model: FiniteStateModel, ground: Plane, transport: WakeTransport | None) -> Float[Array, "L C"]:
+    """Return the matrix of one geometry, untabulated."""
+    solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)
+    return disk_projection(model, ground) @ (solver @ flow_matrix(model, ground, transport))
+
+
+def ground_table(
+    model: FiniteStateModel,
+    height: tuple[float, float],
+    slope_deg: tuple[float, float] = (0.0, 0.0),
+    edge: tuple[float, float] | None = None,
+    transport: WakeTransport | None = None,
+    nodes: tuple[int, int, int] = (18, 7, 33),
+    tolerance: float = 1e-7,
+) -> GroundTable:
+    """Tabulate the ground's response over heights (over R), slopes (degrees) and, for a half-plane, edges (over R).
+
+    model: its plane does not matter; its region must be a `HalfPlane` where `edge` is given. nodes: Chebyshev nodes in
+    height, slope and edge; a parameter without range takes one. tolerance: of the compression, relative to the largest
+    singular value. Raises InputError where a range is not one, the disk would cut the ground, or the wake is followed
+    less deep than the ground may lie.
+    """
+    _check(model, height, slope_deg, edge, transport)
+    ranges = [np.sqrt(height), np.deg2rad(slope_deg)] + ([] if edge is None else [np.array(edge)])
+    counts = tuple(1 if low == high else n for (low, high), n in zip(ranges, nodes, strict=False))
+    grids = [
+        low + (high - low) * (np.polynomial.chebyshev.chebpts1(n) + 1) / 2 if n > 1 else np.array([low])
+        for (low, high), n in zip(ranges, counts, strict=True)
+    ]
+    points = jnp.asarray(np.stack(np.meshgrid(*grids[:2], indexing="ij"), axis=-1).reshape(-1, 2))
+    onto, into = _over_planes(model, points, transport)
+    if edge is None:
+        solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)[None]
+    else:
+        solver = _over_edges(model, jnp.asarray(grids[2]))
+    values = np.asarray(jnp.einsum("plg,egn,pnc->pelc", onto, solver, into, optimize="optimal"))
+    values = values.reshape(-1, *values.shape[2:])
+    level = not np.any(np.array(slope_deg)) and model.region is None
+    rows, columns = _blocks(model, 1 if transport is None else transport.nodes + 1, level)
+    blocks = _gather(values, rows, columns)
+    left, strength, right = np.linalg.svd(blocks.reshape(len(values), -1), full_matrices=False)
+    kept = max(1, int(np.sum(strength > tolerance * strength[0])))
+    return GroundTable(
+        tuple(float(r[0]) for r in ranges),
+        tuple(float(r[1]) for r in ranges),
+        counts,
+        rows,
+        columns,
+        (values.shape[1], values.shape[2]),
+        jnp.asarray(left[:, :kept] * strength[:kept]),
+        jnp.asarray(right[:kept].reshape(kept, *blocks.shape[1:])),
+    )
+
+
+@eqx.filter_jit
+def _over_planes(model: FiniteStateModel, points: Float[Array, "P 2"], transport: WakeTransport | None) -> tuple:
+    def one(point: Array) -> tuple[Array, Array]:
+        ground = Plane(point[0] ** 2, point[1])
+        return disk_projection(model, ground), flow_matrix(model, ground, transport)
+
+    return jax.lax.map(one, points)
+
+
+@eqx.filter_jit
+def _over_edges(model: FiniteStateModel, edges: Float[Array, " E"]) -> Float[Array, "E G N"]:
+    def one(edge: Array) -> Array:
+        region = eqx.tree_at(lambda r: r.edge, model.region, edge)
+        return source_solver(model.sources, model.quadrature, region, model.ground_radius)
+
+    return jax.lax.map(one, edges)
+
+
+def _check(model, height, slope_deg, edge, transport) -> None:
+    for name, (low, high) in {"height": height, "slope_deg": slope_deg, "edge": edge or (0.0, 0.0)}.items():
+        if not (np.isfinite(low) and np.isfinite(high) and low <= high):
+            raise InputError(f"Argument `{name}` must be a range (low, high), but is ({low}, {high})")
+    steepest = float(np.abs(slope_deg).max())
+    radius = 1.0 if model.ground_radius is None else float(model.ground_radius)
+    least = np.tan(np.deg2rad(steepest)) * max(radius, 1.0) if steepest < 60 else np.inf
+    if not height[0] > least:
+        raise InputError(
+            f"Argument `height` must stay above {least:.3g} at {steepest:g} deg, where the disk cuts the ground, but "
+            f"goes down to {height[0]}"
+        )
+    deepest = height[1] + least
+    if transport is not None and transport.length < deepest:
+        raise InputError(
+            f"Argument `transport` must follow the wake down to {deepest:.3g} R, where the ground may lie, but ends at "
+            f"{transport.length:g}"
+        )
+    if edge is not None and not isinstance(model.region, HalfPlane):
+        raise InputError(f"Argument `edge` needs a model whose region is a half-plane, but it is {model.region!r}")
+
+
+def _blocks(model: FiniteStateModel, copies: int, level: bool):
+    """Rows and columns that couple: each harmonic's on level ground, else cosine and sine, or all of a region."""
+
+    def key(mode) -> object:
+        return (mode.m, mode.kind) if level else (mode.kind if model.region is None else 0)
+
+    modes = list(model.modes.modes)
+    row_keys = [key(mode) for mode in disk_modes(model).modes]
+    column_keys = [key(mode) for mode in modes] * copies
+    uniform, by_x = (key(type(modes[0])(m, m, "cos")) for m in (0, 1))
+    column_keys += [uniform, by_x]
+    keys = list(dict.fromkeys(row_keys))
+    found = [
+        tuple(tuple(i for i, k in enumerate(which) if k == one) for one in keys) for which in (row_keys, column_keys)
+    ]
+    return tuple(_padded(group, len(which)) for group, which in zip(found, (row_keys, column_keys), strict=True))
+
+
+def _padded(groups: tuple[tuple[int, ...], ...], past: int) -> tuple[tuple[int, ...], ...]:
+    longest = max(map(len, groups))
+    return tuple(group + (past,) * (longest - len(group)) for group in groups)
+
+
+def _gather(values: np.ndarray, rows: tuple[tuple[int, ...], ...], columns: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Blocks (P, B, I, J) of matrices (P, I, C), zero where padded."""
+    padded = np.pad(values, ((0, 0), (0, 1), (0, 1)))
+    parts = [padded[:, np.array(r)[:, None], np.array(c)[None, :]] for r, c in zip(rows, columns, strict=True)]
+    return np.stack(parts, axis=1)
