@@ -31,7 +31,7 @@ Method = Literal["least_squares", "lbfgs", "adam"]
 
 STEP_LEFT = 1e-5  # of a parameter's range
 UNDETERMINED = 1e-9  # smallest over largest singular value of the scaled Jacobian
-_TOLERANCE = 1e-10
+_TOLERANCE = 1e-8  # of a step in the unbounded coordinates; the verdict is taken from the Jacobian all the same
 
 
 class Verdict(NamedTuple):
@@ -110,10 +110,10 @@ def calibrate(
     begun = time.perf_counter()
     z = parameters.unbounded(_start(parameters, start))
     first = _check(residual, parameters, data, z)
+    unknown = _InCoordinates(residual, parameters)
     if method == "least_squares":
-        z, history, compiled = _levenberg_marquardt(residual, parameters, data, z, max_steps or 200, progress)
+        z, history, compiled = _levenberg_marquardt(unknown, data, z, max_steps or 200, progress)
     else:
-        unknown = _in_coordinates(residual, parameters)
         z, history, compiled = descend(
             unknown, data, z, method, max_steps or (200 if method == "lbfgs" else 4000), progress
         )
@@ -146,7 +146,7 @@ def calibrate_many(
     begun = time.perf_counter()
     z = parameters.unbounded(parameters.check(starts, "starts"))
     _check(residual, parameters, data, z[0])
-    values, good, verdict = jax.block_until_ready(_solve_many(residual, parameters, data, z, max_steps))
+    values, good, verdict = jax.block_until_ready(_solve_many(_InCoordinates(residual, parameters), data, z, max_steps))
     held = np.array([bool(parameters.at_bound(row)) for row in np.asarray(values)])
     converged = np.asarray(good) & (np.asarray(verdict.left) <= STEP_LEFT) & ~held
     return Many(np.asarray(values), np.asarray(verdict.rms), converged, time.perf_counter() - begun)
@@ -216,8 +216,14 @@ def _check(residual: Residual, parameters: ParameterSet, data: PyTree, z: Float[
     return float(np.sqrt(np.mean(r * r)))
 
 
-def _in_coordinates(residual: Residual, parameters: ParameterSet) -> Residual:
-    return lambda z, data: residual(parameters.bounded(z), data)
+class _InCoordinates(eqx.Module):
+    """A residual as a function of the unbounded coordinates; equal ones share their compilation."""
+
+    residual: Residual = eqx.field(static=True)
+    parameters: ParameterSet = eqx.field(static=True)
+
+    def __call__(self, z: Float[Array, " P"], data: Any) -> Float[Array, " N"]:
+        return self.residual(self.parameters.bounded(z), data)
 
 
 def _solver() -> optx.LevenbergMarquardt:
@@ -225,38 +231,45 @@ def _solver() -> optx.LevenbergMarquardt:
 
 
 @eqx.filter_jit
-def _solve_many(residual, parameters, data, z, max_steps):
-    unknown = _in_coordinates(residual, parameters)
-
+def _solve_many(unknown: _InCoordinates, data, z, max_steps):
     def one(start):
         found = optx.least_squares(unknown, _solver(), start, data, max_steps=max_steps, throw=False)
-        values = parameters.bounded(found.value)
-        return values, found.result == optx.RESULTS.successful, judge(residual, parameters, data, values)
+        values = unknown.parameters.bounded(found.value)
+        good = found.result == optx.RESULTS.successful
+        return values, good, judge(unknown.residual, unknown.parameters, data, values)
 
     return jax.vmap(one)(z)
 
 
-def _levenberg_marquardt(residual, parameters, data, z, max_steps, progress):
-    """Step by step, so that there is a history and someone can watch; returns z, rms after each step, compile time."""
-    unknown, solver, tags = _in_coordinates(residual, parameters), _solver(), frozenset()
+@eqx.filter_jit
+def _first_state(unknown: _InCoordinates, data, z):
+    shape = jax.eval_shape(unknown, z, data)
+    return _solver().init(lambda z, data: (unknown(z, data), None), z, data, {}, shape, None, frozenset())
+
+
+@eqx.filter_jit
+def _step(unknown: _InCoordinates, data, z, state):
+    """One step: z, state, rms, and whether that was the last."""
 
     def function(z, data):
         return unknown(z, data), None
 
-    shape = jax.eval_shape(lambda: unknown(z, data))
-    step = eqx.filter_jit(lambda z, state: solver.step(function, z, data, {}, state, tags))
-    done = eqx.filter_jit(lambda z, state: solver.terminate(function, z, data, {}, state, tags)[0])
-    rms = eqx.filter_jit(lambda z: jnp.sqrt(jnp.mean(unknown(z, data) ** 2)))
-    state = solver.init(function, z, data, {}, shape, None, tags)
+    z, state, _ = _solver().step(function, z, data, {}, state, frozenset())
+    done, _ = _solver().terminate(function, z, data, {}, state, frozenset())
+    return z, state, jnp.sqrt(jnp.mean(unknown(z, data) ** 2)), done
+
+
+def _levenberg_marquardt(unknown: _InCoordinates, data, z, max_steps, progress):
+    """Step by step, so that there is a history and someone can watch; returns z, rms after each step, compile time."""
     begun, compiled, history = time.perf_counter(), 0.0, []
+    state = _first_state(unknown, data, z)
     for i in range(max_steps):
-        z, state, _ = step(z, state)
-        history.append(float(rms(z)))
-        finished = bool(done(z, state))
+        z, state, rms, done = _step(unknown, data, z, state)
+        history.append(float(rms))
         if i == 0:
             compiled = time.perf_counter() - begun
         if progress is not None:
             progress(i + 1, history[-1])
-        if finished:
+        if bool(done):
             break
     return z, history, compiled

@@ -98,6 +98,7 @@ def hayden_data(
     return data, chosen
 
 
+@eqx.filter_jit
 def inflow_ratio(data: HaydenData, b: Float[Array, ""], p: Float[Array, ""]) -> Float[Array, " H"]:
     """Return the mean inflow at each height over that out of ground effect, at the same thrust."""
 

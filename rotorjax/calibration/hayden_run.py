@@ -1,0 +1,159 @@
+"""The whole calibration against Hayden: fits by three drivers, many starts, and what they leave behind."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from rotorjax.calibration import hayden
+from rotorjax.calibration.calibration_file import Calibration, save
+from rotorjax.calibration.figures import hayden_figure
+from rotorjax.calibration.fit import Fit, Many, Progress, calibrate, calibrate_many, even_starts
+from rotorjax.calibration.hayden import HaydenData
+from rotorjax.calibration.record import fit_entry
+from rotorjax.errors import InputError
+from rotorjax.io.atomic import make_folder, write_json
+from rotorjax.study.cases import Case
+from rotorjax.study.dataset import select
+
+STARTS = 256
+
+
+@dataclass(frozen=True)
+class HaydenRun:
+    """Data and fits. fits: by driver, "least_squares" first; many: least squares from STARTS starts.
+
+    wall_time_s: of all drivers and starts, compiled; compile_time_s: what they took longer at first.
+    """
+
+    data: HaydenData
+    loading: str
+    fits: dict[str, Fit]
+    many: Many
+    wall_time_s: float
+    compile_time_s: float
+
+    @property
+    def fit(self) -> Fit:
+        """The least-squares fit."""
+        return self.fits["least_squares"]
+
+    @property
+    def spread(self) -> float:
+        """Largest difference of any start's end from the fit, over the parameters."""
+        return float(np.max(np.abs(self.many.values - self.fit.values)))
+
+    @property
+    def disagreement(self) -> float:
+        """Largest difference of another driver's values from least squares'."""
+        return max(float(np.max(np.abs(f.values - self.fit.values))) for f in self.fits.values())
+
+    def ratios(self, printed: bool = False) -> np.ndarray:
+        """Inflow ratio at each height, fitted or with the printed factor, (H,)."""
+        values = hayden.PARAMETERS.printed if printed else self.all_values
+        return np.asarray(hayden.inflow_ratio(self.data, *(jnp.asarray(v) for v in values)))
+
+    @property
+    def all_values(self) -> np.ndarray:
+        """b and p, fitted or fixed."""
+        return np.asarray(hayden.PARAMETERS.complete(jnp.asarray(self.fit.values), self.data.free, self.data.fixed))
+
+    @property
+    def printed_rms(self) -> float:
+        """Rms of the printed factor."""
+        return float(np.sqrt(np.mean((self.ratios(printed=True) - np.asarray(self.data.targets)) ** 2)))
+
+
+def run(
+    heights: Sequence[float] = hayden.HEIGHTS,
+    parameters: Sequence[str] = ("b", "p"),
+    loading: hayden.Loading = "elliptic",
+    tau: tuple[np.ndarray, np.ndarray] | None = None,
+    progress: Progress | None = None,
+) -> HaydenRun:
+    """Fit with all drivers and from many starts. Arguments and errors: as `hayden.hayden_data`."""
+    data, chosen = hayden.hayden_data(heights, parameters, loading, tau)
+
+    def everything() -> tuple[dict[str, Fit], Many]:
+        names = ("least_squares", "lbfgs", "adam")
+        fits = {n: calibrate(hayden.residual, chosen, data, method=n, progress=progress) for n in names}
+        return fits, calibrate_many(hayden.residual, chosen, data, even_starts(chosen, STARTS))
+
+    begun = time.perf_counter()
+    everything()
+    first = time.perf_counter() - begun
+    begun = time.perf_counter()
+    fits, many = everything()
+    again = time.perf_counter() - begun
+    return HaydenRun(data, "free wake" if tau is not None else loading, fits, many, again, max(first - again, 0.0))
+
+
+def loads_of(merged: Any, heights: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
+    """Axisymmetric pressure coefficients of a study's level cases (H, M) and of the one out of ground effect (M,).
+
+    Raises InputError where one of them is missing or did not converge.
+    """
+    rows = []
+    for case in (*(Case(h) for h in heights), Case()):
+        data = select(merged, case)
+        if data is None or not bool(data["converged"]):
+            raise InputError(f"Argument `heights` must be among the study's converged cases, but {case.name} is not")
+        rows.append(data["vpbfsm_tau"].to_numpy()[:3])  # m = 0 comes first
+    return np.array(rows[:-1]), rows[-1]
+
+
+def record(result: HaydenRun) -> dict[str, Any]:
+    """Content of calibration.json."""
+    fit = result.fit
+    return fit_entry(fit, "hayden", result.printed_rms) | {
+        "b": float(result.all_values[0]),
+        "p": float(result.all_values[1]),
+        "loading": result.loading,
+        "heights": result.data.heights,
+        "targets": result.data.targets,
+        "inflow_ratio": result.ratios(),
+        "inflow_ratio_printed_factor": result.ratios(printed=True),
+        "drivers": {n: {"parameters": f.parameters.table(f.values), "rms_error": f.rms, "converged": f.converged}
+                    for n, f in result.fits.items()},
+        "largest_difference_of_drivers": result.disagreement,
+        "starts": {"count": STARTS, "converged": int(result.many.converged.sum()), "spread": result.spread,
+                   "wall_time_s": result.many.wall_time_s},
+        "wall_time_s": result.wall_time_s,
+        "compile_time_s": result.compile_time_s,
+    }  # fmt: skip
+
+
+def write(result: HaydenRun, folder: str | Path) -> Calibration:
+    """Write calibration.toml, calibration.json and hayden.png into a folder. Raises InputError where it cannot be."""
+    folder = make_folder(folder)
+    values = hayden.PARAMETERS.table(result.all_values)
+    about = {"loading": result.loading, "heights": [float(h) for h in result.data.heights], "free": result.data.free}
+    calibration = Calibration("hayden", values, result.fit.converged, result.fit.rms, about)
+    save(folder / "calibration.toml", calibration)
+    write_json(folder / "calibration.json", record(result))
+    hayden_figure(result, folder / "hayden.png")
+    return calibration
+
+
+def report(result: HaydenRun) -> str:
+    """What was fitted, as text for the screen."""
+    fit, deviations = result.fit, result.fit.deviations
+    lines = [f"Hayden's factor at constant thrust, {len(result.data.heights)} heights, loading: {result.loading}", ""]
+    for name, value, deviation in zip(fit.parameters.names, fit.values, deviations, strict=True):
+        lines.append(f"{name:<8}{value:.6f}" + (f" ± {deviation:.6f}" if np.isfinite(deviation) else ""))
+    lines += ["", f"{'h/R':>6}{'Hayden':>10}{'fitted':>10}{'printed factor':>16}"]
+    rows = zip(result.data.heights, result.data.targets, result.ratios(), result.ratios(printed=True), strict=True)
+    lines += [f"{h:6.2f}{t:10.4f}{ours:10.4f}{theirs:16.4f}" for h, t, ours, theirs in rows]
+    lines += [
+        f"{'rms':>6}{'':>10}{fit.rms:10.4f}{result.printed_rms:16.4f}",
+        "",
+        f"drivers agree to {result.disagreement:.1e}; {int(result.many.converged.sum())} of {STARTS} starts converge, "
+        f"within {result.spread:.1e}",
+        ("converged: " if fit.converged else "NOT CONVERGED: ") + fit.why,
+        f"{result.wall_time_s:.1f} s, compiling {result.compile_time_s:.1f} s",
+    ]
+    return "\n".join(lines)

@@ -1,0 +1,91 @@
+"""`rotorjax calibrate`: fit the finite-state model to Hayden's ground effect or to the free wake."""
+
+import argparse
+import sys
+from pathlib import Path
+
+LOADINGS = ("elliptic", "uniform", "triangular")
+
+
+def register(commands: argparse._SubParsersAction) -> None:
+    """Add the command with its two targets."""
+    parser = commands.add_parser(
+        "calibrate",
+        help="fit the finite-state model to Hayden or to the free wake",
+        description="Fit parameters of the VPBFSM and write calibration.toml, calibration.json and pictures. Exit code "
+        "1 where the fit did not converge or a parameter ended at a bound.",
+    )
+    targets = parser.add_subparsers(dest="target", metavar="TARGET", required=True, parser_class=type(parser))
+    hayden = targets.add_parser("hayden", help="factor b^(eta^p) against Hayden's k_G at constant thrust")
+    hayden.add_argument("--heights", nargs="+", type=float, metavar="H", help="over R (0.5 0.75 1 1.5 2 3)")
+    hayden.add_argument("--parameters", default="b,p", metavar="NAMES", help="what to fit, by commas (b,p)")
+    loads = hayden.add_mutually_exclusive_group()
+    loads.add_argument("--loading", choices=LOADINGS, default="elliptic", help="given loading (elliptic)")
+    loads.add_argument("--cases", type=Path, metavar="FILE", help="blade loads of a study: cases.nc or its folder")
+    hayden.set_defaults(run=run_hayden)
+    wake = targets.add_parser("freewake", help="six corrections against the free wake's inflow")
+    wake.add_argument("--cases", required=True, type=Path, metavar="FILE", help="a study's cases.nc or its folder")
+    wake.add_argument("--parameters", metavar="NAMES", help="what to fit, by commas (all)")
+    wake.add_argument("--held", nargs="*", metavar="CASE", help="cases to hold out (every second height and slope)")
+    wake.set_defaults(run=run_freewake)
+    for target in (hayden, wake):
+        target.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
+
+
+def run_hayden(chosen: argparse.Namespace) -> int:
+    """Calibrate against Hayden; the exit code."""
+    from rotorjax.calibration import hayden, hayden_run
+    from rotorjax.calibration.teacher import find_cases
+    from rotorjax.io.atomic import make_folder
+
+    make_folder(chosen.out)  # before the work, not after it
+    heights = chosen.heights or hayden.HEIGHTS
+    tau = None if chosen.cases is None else hayden_run.loads_of(find_cases(chosen.cases), heights)
+    with _Bar("hayden") as bar:
+        result = hayden_run.run(heights, _names(chosen.parameters), chosen.loading, tau, bar.show)
+    print(hayden_run.report(result))
+    hayden_run.write(result, chosen.out)
+    print(f"written: {chosen.out / 'calibration.toml'}")
+    return 0 if result.fit.converged else 1
+
+
+def run_freewake(chosen: argparse.Namespace) -> int:
+    """Calibrate against the free wake; the exit code."""
+    from rotorjax.calibration import freewake_run
+    from rotorjax.calibration.taught import PARAMETERS
+    from rotorjax.calibration.teacher import find_cases
+    from rotorjax.io.atomic import make_folder
+
+    make_folder(chosen.out)
+    names = PARAMETERS.names if chosen.parameters is None else _names(chosen.parameters)
+    merged = find_cases(chosen.cases)
+    with _Bar("free wake") as bar:
+        result = freewake_run.run(merged, names, chosen.held, progress=bar.show)
+    print(freewake_run.report(result))
+    freewake_run.write(result, chosen.out)
+    print(f"written: {chosen.out / 'calibration.toml'}")
+    return 0 if result.fit.converged else 1
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(n.strip() for n in text.split(",") if n.strip()))
+
+
+class _Bar:
+    """A line on stderr with the step and the rms."""
+
+    def __init__(self, what: str):
+        from tqdm import tqdm
+
+        self._bar = tqdm(desc=what, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr)
+
+    def __enter__(self) -> "_Bar":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def show(self, step: int, rms: float) -> None:
+        """Show progress."""
+        self._bar.set_postfix_str(f"step {step}, rms {rms:.5f}", refresh=False)
+        self._bar.update()

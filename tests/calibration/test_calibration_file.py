@@ -1,0 +1,82 @@
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.calibration import taught
+from rotorjax.calibration.calibration_file import Calibration, load, save
+from rotorjax.errors import InputError
+from rotorjax.ground import plane
+from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
+
+TAU = jnp.array([2.6e-3, 6e-4, 3e-4])
+HAYDEN = Calibration(
+    "hayden", {"b": 0.0917, "p": 1.2765}, True, 0.00355, {"loading": "elliptic", "heights": [0.5, 1.0]}
+)
+TAUGHT = Calibration(
+    "freewake",
+    taught.PARAMETERS.table(jnp.asarray([1.1, 1.0, -0.5, 0.4, 3.0, 0.3])),
+    False,
+    0.12,
+    {"radial_terms": 3, "source_terms": 5, "cases": ["oge", "h1"], "note": 'a "quoted" \\ name'},
+)
+
+
+@pytest.mark.parametrize("calibration", [HAYDEN, TAUGHT], ids=["hayden", "freewake"])
+def test_a_file_gives_back_what_was_saved(calibration, tmp_path):
+    save(tmp_path / "a.toml", calibration)
+    assert load(tmp_path / "a.toml") == calibration
+
+
+def test_hayden_sets_the_factor():
+    model = finite_state_model(plane(1.0))
+    calibrated, state = HAYDEN.apply(model, TAU)
+    theirs = finite_state_model(plane(1.0), b=0.0917, p=1.2765)
+    np.testing.assert_allclose(
+        mean_inflow(state, calibrated), mean_inflow(steady_state(theirs, TAU), theirs), rtol=1e-13
+    )
+
+
+def test_the_taught_model_is_applied():
+    model = finite_state_model(plane(1.0))
+    calibrated, state = TAUGHT.apply(model, TAU)
+    values = taught.PARAMETERS.vector(TAUGHT.parameters)
+    ours = taught.taught_model(model, values)
+    np.testing.assert_array_equal(state.a, taught.taught_state(ours, TAU, values).a)
+    assert calibrated.correction.b == ours.correction.b
+
+
+def test_a_model_of_other_terms_is_refused():
+    with pytest.raises(InputError, match="source_terms = 7, but has 5"):
+        TAUGHT.apply(finite_state_model(plane(1.0), ground_radial_terms=7), TAU)
+
+
+CHANGES = {
+    "must be for model version 1, but is for 2": ("model_version = 1", "model_version = 2"),
+    "must be one of hayden, freewake, but is 'other'": ('set = "hayden"', 'set = "other"'),
+    r"\[parameters\] must hold mean_gain": ('set = "hayden"', 'set = "freewake"'),
+    "must hold b, p, but holds b, q": ("p = ", "q = "),
+    "must hold b, p, but holds b, q, p": ("p = ", "q = 1.0\np = "),
+    r"`b` must lie in \[0.001, 1\], but is 5": ("b = 0.0917", "b = 5.0"),
+    "`b` must be a finite number, but is nan": ("b = 0.0917", "b = nan"),
+    "`b` must be a finite number, but is 'x'": ("b = 0.0917", 'b = "x"'),
+    "lacks converged": ("converged = true\n", ""),
+    "must hold .calibration. and .parameters.": ("[parameters]", "[parametres]"),
+    "cannot be read": ("[parameters]", "[parameters"),
+}
+
+
+@pytest.mark.parametrize("message", CHANGES)
+def test_a_file_that_is_not_ours_is_refused(message, tmp_path):
+    path = tmp_path / "a.toml"
+    save(path, HAYDEN)
+    text = path.read_text()
+    old, new = CHANGES[message]
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=message):
+        load(path)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"none\.toml"):
+        load(tmp_path / "none.toml")

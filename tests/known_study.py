@@ -1,0 +1,54 @@
+"""A small study whose free wake is the finite-state model itself with known corrections: the fit must find them."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from rotorjax.calibration.taught import PARAMETERS, taught_model, taught_state
+from rotorjax.potential.model import disk_inflow, finite_state_model
+from rotorjax.study.cases import study_cases
+
+TRUTH = {
+    "mean_gain": 1.13,
+    "third_gain": 1.02,
+    "fifth_gain": -0.5,
+    "reach": 0.5,
+    "source_gain": 2.5,
+    "slope_share": 0.4,
+}
+REFERENCE = 0.06
+R, PSI = np.linspace(0.2, 0.98, 9), 2 * np.pi / 8 * np.arange(8)
+
+
+def known_study(noise: float = 0.0) -> xr.Dataset:
+    """cases.nc as a study writes it, as far as a calibration reads it."""
+    cases = study_cases((0.5, 0.75, 1.0, 1.5, 2.0), (10.0, 20.0, 30.0))
+    values, fields, taus = PARAMETERS.vector(TRUTH), [], []
+    x, y = jnp.asarray(R * np.cos(PSI)[:, None]), jnp.asarray(R * np.sin(PSI)[:, None])
+    for i, case in enumerate(cases):
+        model = finite_state_model(case.ground, harmonics=1, ground_harmonics=1, ground_radial_terms=4)
+        tau = jnp.zeros(9).at[:4].set(jnp.array([2.6e-3, 6e-4 + 2e-5 * i, 3e-4 - 2e-5 * i, 1e-5 * i]))
+        model = taught_model(model, values)
+        fields.append(np.asarray(disk_inflow(taught_state(model, tau, values), x, y, model)))
+        taus.append(np.asarray(tau))
+    heights = [np.nan if c.height is None else c.height for c in cases]
+    grid, count = ("case", "station_azimuth", "radius"), len(cases)
+    wobble = noise * np.random.default_rng(0).standard_normal((count, PSI.size, R.size))
+    data = xr.Dataset(
+        {
+            "free_wake_inflow": (("case", "azimuth", "radius"), np.array(fields) + REFERENCE * wobble),
+            "vpbfsm_inflow": (grid, np.array(fields)),
+            "vpbfsm_tau": (("case", "mode"), np.array(taus)),
+            "panel_width": (("case", "radius"), np.full((count, R.size), 0.0975)),
+            "height": ("case", heights),
+            "slope_deg": ("case", [c.slope_deg for c in cases]),
+            "converged": ("case", np.ones(count)),
+            "reference_inflow": ((), REFERENCE),
+        },
+        coords={"case": [c.name for c in cases], "radius": R, "station_azimuth": PSI, "azimuth": PSI},
+    )
+    settings = {"vpbfsm.radial_terms": 3, "vpbfsm.harmonics": 1, "vpbfsm.source_terms": 4}
+    data.attrs = {"settings": json.dumps(settings), "fingerprint": "made up"}
+    return data
