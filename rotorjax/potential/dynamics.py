@@ -6,8 +6,11 @@ others, λ = λ_climb + λ_i, λ_i = (2/√3)[L⁻¹Ma]_1; in hover V and 2V, as
 With odd modes only, the field of an acceleration is the nearest that the odd functions offer; even modes
 (`even_terms` of the model) complete them, and the flow converges to the exact linear one at every frequency.
 
-The costates Δ obey the same equation with −[M]Δ̇: forward in time they grow, so they are marched backward from the end
-of a window, where they start from their steady value; the start is forgotten after the transit time of the wake.
+The costates Δ obey the same equation with −[M]Δ̇ and the skew reversed, L(−X): the adjoint stream comes down from aft.
+With that and τ itself the terms of Eq. 7 are taken at ψ; the print's τ† = (−1)^{j+1}τ with L(X) has them at ψ + π
+(tests/potential/test_dynamics.py compares with the exact skewed flow). Forward in time costates grow, so they are
+marched backward from the end of a window, where they start from their steady value; the start is forgotten after the
+transit time of the wake.
 """
 
 from functools import cache
@@ -147,6 +150,8 @@ def costates(
         raise InputError(f"Arguments `psi`, `a`, `inputs.tau` must share T and M, but have {shapes}")
     d, mass = (jnp.asarray(f(model.modes, model.modes), a.dtype) for f in (damping, apparent_mass))
     v, inverse = jax.vmap(lambda a, i: flow_matrices(a, i, model, skewed))(a, inputs)
+    turn = jnp.asarray(np.where(model.modes.m % 2 == 0, 1.0, -1.0), a.dtype)
+    inverse = turn[:, None] * inverse * turn  # L(−X) from L(X)
     decay = d @ (v[:, :, None] * inverse)  # −M Δ̇ + decay Δ = D τ
     force = inputs.tau @ d.T
 
@@ -175,19 +180,23 @@ def axial_velocity(
     delta: Float[Array, "T M"],
     speed: Float[Array, ""],
     model: FiniteStateModel,
+    chi: Float[Array, ""] | float = 0.0,
 ) -> Float[Array, "*N"]:
-    """Return the rotor's downward velocity (over ΩR) at hub-frame points and one time, for a straight wake.
+    """Return the rotor's downward velocity (over ΩR) at hub-frame points and one time.
 
     Above the disk Σ a(t) Φ. Below it (Eq. 7 with right parities) v_A(t) = v_B(t₀) + v_C†(t₀) − v_D†(t), where
-    t₀ = t − depth/speed is when the fluid at A passed the disk at B = C, and D is the mirror point above; † takes the
-    costates `delta`. With odd states alone the flow is exact in steady motion and off by some per cent at a reduced
-    frequency ω/speed of 0.3; even states (`even_terms`) make it converge at any frequency.
+    t₀ = t − depth/(speed cos χ) is when the fluid at A passed the disk's plane at B = C, which lies depth · tan χ
+    upstream of A, and D is the mirror point above; † takes the costates `delta`. chi: skew of the wake (rad). With odd
+    states alone the flow is exact in steady motion and off by some per cent at a reduced frequency ω/speed of 0.3; even
+    states (`even_terms`) make it converge at any frequency.
     psi: instants of the window, which must hold t₀ … t; speed: convection speed of the wake, over ΩR.
     """
     x, y, z = jnp.moveaxis(points, -1, 0)
-    mirror, foot = (jnp.stack([x, y, height], axis=-1) for height in (jnp.abs(z), jnp.zeros_like(z)))
+    below = jnp.maximum(-z, 0.0)
+    mirror = jnp.stack([x, y, jnp.abs(z)], axis=-1)
+    foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.zeros_like(z)], axis=-1)
     phi, disk = pressure_functions(model.modes, mirror), pressure_functions(model.modes, foot)
-    passed = time - jnp.maximum(-z, 0.0) / speed
-    below = jnp.sum((_at(passed, psi, a) + _at(passed, psi, delta)) * disk, axis=0)
-    below = below - jnp.tensordot(_at(time, psi, delta), phi, 1)
-    return jnp.where(z >= 0, jnp.tensordot(_at(time, psi, a), phi, 1), below)
+    passed = time - below / (speed * jnp.cos(chi))
+    wake = jnp.sum((_at(passed, psi, a) + _at(passed, psi, delta)) * disk, axis=0)
+    wake = wake - jnp.tensordot(_at(time, psi, delta), phi, 1)
+    return jnp.where(z >= 0, jnp.tensordot(_at(time, psi, a), phi, 1), wake)

@@ -5,11 +5,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.ode.export import to_control, to_dataset
-from rotorjax.potential.blades import linear_blades, stations
+from rotorjax.potential.blades import Blades, linear_blades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
@@ -178,3 +179,51 @@ def test_bad_input(models):
     with pytest.raises(InputError, match="'angle'"):
         state_space(model, state, now, inputs=["angle"])
     assert rhs(jnp.zeros(()), state, now, model).a.shape == (6,)
+
+
+def free_rotor(solidity=0.0423, radial_terms=4, blades=True):
+    """A rotor far above ground."""
+    rotor = finite_state_model(radial_terms=radial_terms, quadrature=DiskQuadrature(12, 4))
+    loads = linear_blades(solidity) if blades else None
+    return over_ground(rotor, ground_table(rotor, (60.0, 60.0)), loads, at=stations(0.0, 10, 1))
+
+
+def test_frequency_response_of_one_state_is_the_analytic_one():
+    """dλ₀/dτ₁ = (2/√3)/(2v₀ + iω M/D): first order, with the corner at 2v₀ D/M."""
+    model = free_rotor(radial_terms=1, blades=False)
+    tau = jnp.array([np.sqrt(3) / 4 * 0.006])
+    now = controls(still(plane(60.0)), model.rotor, tau=tau)
+    linear = state_space(model, trim(model, now, jnp.array([0.05])), now, inputs=["tau"], outputs=["uniform"])
+    omega, v0 = np.array([0.001, 0.05, 0.2, 1.0]), np.sqrt(0.003)
+    expected = 2 / np.sqrt(3) / (2 * v0 + 1j * omega * 0.75 / (np.pi / 2))
+    np.testing.assert_allclose(linear.response(omega)[:, 0, 0], expected, rtol=1e-3)
+
+
+class UniformlyAccelerating(Blades):
+    """The blades of Carpenter and Fridovich: uniform inflow, so a loading ∝ √(1−r²) that accelerates the disk so."""
+
+    def loading(self, down, collective, mu, at):
+        mean = jnp.sum(2 * at.r * at.widths * down.mean(axis=0))
+        thrust = 0.0423 * 5.73 / 2 * (collective / 3 - mean / 2)
+        return jnp.broadcast_to(3 * at.r * jnp.sqrt(1 - at.r**2) * thrust, down.shape)
+
+
+@pytest.mark.parametrize(("degrees", "ratio"), [(6, 1.91), (8, 1.75), (12, 1.58)])
+def test_step_of_collective_against_carpenter_and_fridovich(degrees, ratio):
+    """0.849 λ' + 2λ² = C_T(θ, λ) without flapping (NACA TN 3044): inflow within 5 % of its end value at all times.
+
+    Real linear blades load the tip more, where the air has less inertia: their inflow rises 18 % sooner to 63 %.
+    """
+    psi, theta = jnp.linspace(0, 60, 1201), np.deg2rad(degrees)
+    free = free_rotor()
+    model = over_ground(free.rotor, free.table, UniformlyAccelerating(), at=stations(0.0, 24, 1))
+    now = controls(still(plane(60.0)), model.rotor, theta)
+    many = jax.tree.map(lambda v: jnp.broadcast_to(v, (1201, *v.shape)), now)
+    at_rest_ = RotorState(jnp.zeros(4), jnp.zeros((0, 4)))
+    exact = solve_ivp(
+        lambda _, lam: (0.0423 * 5.73 / 2 * (theta / 3 - lam / 2) - 2 * lam**2) / 0.849, (0, 60), [0.0], t_eval=psi
+    ).y[0]
+    lam = np.array(simulate(model, at_rest_, psi, many).outputs.uniform)
+    assert np.abs(lam - exact).max() < 0.05 * exact[-1]
+    thrust = np.array(simulate(free, at_rest_, psi, many).outputs.thrust)
+    np.testing.assert_allclose(thrust[0] / thrust[-1], ratio, rtol=0.01)

@@ -1,0 +1,217 @@
+"""Several rotors: each with its place, tilt and sense of rotation, each inducing on the others, each with its ground.
+
+Every rotor has the states of `rotorjax.potential.dynamics` in its own frame; for one that turns clockwise that frame is
+mirrored in y, so that its blades run along rising azimuth too. Another rotor's flow adds to the air that passes a disk:
+the mass flow is V_T = |λ| and V̄ = λ + λ_i with λ = climb + own mean inflow λ_i + mean of what the others induce there.
+Two rotors at one place so share their flow, and one far below another climbs in its far wake. Wakes are straight along
+their own rotor's axis, do not contract, and reach the others at once. Over ground each rotor's sources close the plane
+to its own wake, and act on all rotors.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.potential.dynamics import rate_table
+from rotorjax.potential.field import disk_functions, field_functions
+from rotorjax.potential.model import FiniteStateModel, ground_matrix, ground_upflow
+
+
+class Rotors(eqx.Module):
+    """B rotors of one radius.
+
+    model: modes of each rotor, and the ground's sources. positions (B, 3): hubs in the common frame (x aft, y to
+    starboard, z up), over R. frames (B, 3, 3): columns are each rotor's axes there. ground: plane under the common
+    origin, or None. inflow (B, B, N, M): downward flow of unit states of the second rotor at the N quadrature points
+    of the first one's disk, with the ground's answer.
+    """
+
+    model: FiniteStateModel
+    positions: Float[Array, "B 3"]
+    frames: Float[Array, "B 3 3"]
+    ground: Plane | None
+    inflow: Float[Array, "B B N M"]
+
+
+def rotors(
+    model: FiniteStateModel,
+    positions: Sequence[Sequence[float]],
+    tilts_deg: Sequence[Sequence[float]] | None = None,
+    senses: Sequence[int] | None = None,
+    ground: Plane | None = None,
+) -> Rotors:
+    """Make rotors from their hubs (over R), tilts about x and y (degrees) and senses (1 counter-clockwise, −1 not).
+
+    model: its own plane is not used. ground: under the common origin; every rotor must be level then. Raises
+    InputError where shapes differ, a sense is not ±1, disks meet, or a disk would cut the ground.
+    """
+    place = np.array(positions, float)
+    count = len(place)
+    tilts = np.zeros((count, 2)) if tilts_deg is None else np.array(tilts_deg, float)
+    sense = np.ones(count) if senses is None else np.array(senses, float)
+    if place.shape != (count, 3) or tilts.shape != (count, 2) or sense.shape != (count,) or count < 1:
+        raise InputError(
+            "Arguments `positions`, `tilts_deg`, `senses` must have shapes (B, 3), (B, 2), (B,), but have "
+            f"{place.shape}, {tilts.shape}, {sense.shape}"
+        )
+    if not np.all(np.abs(sense) == 1):
+        raise InputError(f"Argument `senses` must hold 1 (counter-clockwise) or -1, but is {sense.tolist()}")
+    frames = np.array([_frame(row[0], row[1], s) for row, s in zip(np.deg2rad(tilts), sense, strict=True)])
+    _require_apart(place, frames[:, :, 2])
+    _require_over(place, tilts, ground)
+    places, axes = jnp.asarray(place), jnp.asarray(frames)
+    return Rotors(model, places, axes, ground, _inflow(model, places, axes, ground))
+
+
+def _frame(about_x: float, about_y: float, sense: float) -> np.ndarray:
+    cx, sx, cy, sy = np.cos(about_x), np.sin(about_x), np.cos(about_y), np.sin(about_y)
+    turn = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    return turn * np.array([1, sense, 1])
+
+
+def _require_apart(place: np.ndarray, axes: np.ndarray) -> None:
+    for i in range(len(place)):
+        for j in range(i):
+            if _meet(place[i], axes[i], place[j], axes[j]):
+                raise InputError(
+                    f"Argument `positions` must keep the disks apart, but rotors {j} and {i} at {place[j].tolist()} "
+                    f"and {place[i].tolist()} overlap: move one by a radius or along its axis"
+                )
+
+
+def _meet(p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray) -> bool:
+    """Whether two unit disks, at p and q with normals n and m, have a point in common."""
+    along = np.cross(n, m)
+    if np.linalg.norm(along) < 1e-9:
+        return bool(abs((q - p) @ n) < 1e-6 and np.linalg.norm(q - p) < 2)
+    along = along / np.linalg.norm(along)
+    point = np.linalg.solve(np.stack([n, m, along]), np.array([n @ p, m @ q, 0.0]))
+    spans = []
+    for centre in (p, q):
+        middle = (centre - point) @ along
+        half2 = 1 - np.sum((centre - point - middle * along) ** 2)
+        if half2 <= 0:
+            return False
+        spans.append((middle - np.sqrt(half2), middle + np.sqrt(half2)))
+    return bool(max(spans[0][0], spans[1][0]) < min(spans[0][1], spans[1][1]))
+
+
+def _require_over(place: np.ndarray, tilts: np.ndarray, ground: Plane | None) -> None:
+    if ground is None:
+        return
+    if np.any(tilts != 0):
+        raise InputError(f"Argument `tilts_deg` must be zero over ground, but is {tilts.tolist()}")
+    slope = float(jnp.tan(ground.slope))
+    height = float(ground.height) + place[:, 2] - place[:, 0] * slope
+    if not np.all(height > abs(slope)):
+        i = int(np.flatnonzero(~(height > abs(slope)))[0])
+        raise InputError(
+            f"Argument `positions` must keep every disk above the ground, but rotor {i} is {height[i]:.3g} R over it"
+        )
+
+
+def _under(ground: Plane, place: Float[Array, "3"]) -> Plane:
+    """The plane seen from a rotor's hub."""
+    return Plane(ground.height + place[2] - place[0] * jnp.tan(ground.slope), ground.slope)
+
+
+def _flow_of(
+    model: FiniteStateModel, place: Array, frame: Array, ground: Plane | None, points: Float[Array, "N 3"]
+) -> Float[Array, "3 M N"]:
+    """Velocity in the common frame of one rotor's unit states at points, the answer of its ground included."""
+    own = (points - place) @ frame
+    flow = field_functions(model.modes, own)
+    if ground is not None:
+        seen = _under(ground, place)
+        upward = ground_matrix(model, seen).T @ ground_upflow(model, seen, own)
+        flow = flow.at[2].add(upward)
+    return jnp.einsum("ab,bmn->amn", frame, flow)
+
+
+@eqx.filter_jit
+def _inflow(model: FiniteStateModel, places: Array, frames: Array, ground: Plane | None) -> Float[Array, "B B N M"]:
+    x, y, _, _ = (jnp.asarray(v) for v in model.quadrature.rule())
+    local = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
+    rows = []
+    for i in range(len(places)):
+        points = places[i] + local @ frames[i].T
+        flows = [_flow_of(model, places[j], frames[j], ground, points) for j in range(len(places))]
+        rows.append(jnp.stack([-jnp.einsum("a,amn->nm", frames[i][:, 2], flow) for flow in flows]))
+    return jnp.stack(rows)
+
+
+def _area(model: FiniteStateModel) -> Float[Array, " N"]:
+    _, _, nu, weights = model.quadrature.rule()
+    return jnp.asarray(2 * nu * weights)
+
+
+def _own(system: Rotors) -> Float[Array, " M"]:
+    """Mean inflow of each own state, the ground left out as in the paper's mass flow."""
+    x, y, _, _ = (jnp.asarray(v) for v in system.model.quadrature.rule())
+    return disk_functions(system.model.modes, x, y) @ _area(system.model)
+
+
+def mass_flows(a: Float[Array, "B M"], climb: Float[Array, " B"], system: Rotors) -> Float[Array, "B M"]:
+    """Return the diagonals of V of all rotors."""
+    modes = system.model.modes
+    passing = jnp.einsum("n,ijnm,jm->ij", _area(system.model), system.inflow, a)
+    others = jnp.sum(passing * (1 - jnp.eye(len(a))), axis=1)
+    induced = a @ _own(system)
+    through = climb + induced + others
+    speed = jnp.abs(through)
+    later = speed if system.model.mass_flow == "linear" else jnp.abs(through + induced)
+    return jnp.where(np.arange(len(modes)) == modes.index(0, 1), speed[:, None], later[:, None])
+
+
+def rates(
+    t: Float[Array, ""], a: Float[Array, "B M"], tau: Float[Array, "B M"], climb: Float[Array, " B"], system: Rotors
+) -> Float[Array, "B M"]:
+    """Return d(a)/dψ of all rotors under loads tau and climb speeds (over ΩR); t does not enter."""
+    del t
+    return (tau - mass_flows(a, climb, system) * a) @ jnp.asarray(rate_table(system.model.modes)).T
+
+
+@eqx.filter_jit
+def steady(system: Rotors, tau: Float[Array, "B M"], climb: Float[Array, " B"] | None = None) -> Float[Array, "B M"]:
+    """Return the states that stay under constant loads, by Newton's method from those of rotors on their own.
+
+    tau: pressure coefficients with positive thrust; climb: over ΩR, zero by default. Raises InputError where the shape
+    of tau differs, and an error at run time where Newton's method does not converge.
+    """
+    shape = (len(system.positions), len(system.model.modes))
+    if tau.shape != shape:
+        raise InputError(f"Argument `tau` must have shape {shape}, rotors and modes, but has {tau.shape}")
+    still = jnp.zeros(shape[0]) if climb is None else climb
+    first = tau[:, system.model.modes.index(0, 1)]
+    start = tau / jnp.sqrt(2 / np.sqrt(3) * first)[:, None]
+
+    def residual(a: Array, _: None) -> Array:
+        return tau - mass_flows(a, still, system) * a
+
+    return optx.root_find(residual, optx.Newton(rtol=1e-11, atol=1e-14), start, max_steps=60).value
+
+
+def inflows(a: Float[Array, "B M"], system: Rotors) -> Float[Array, "B N"]:
+    """Return λ (over ΩR, positive down through each disk) at the quadrature points of every disk, all rotors' flow."""
+    return jnp.einsum("ijnm,jm->in", system.inflow, a)
+
+
+def mean_inflows(a: Float[Array, "B M"], system: Rotors) -> Float[Array, " B"]:
+    """Return the area-weighted mean of λ over each disk."""
+    return inflows(a, system) @ _area(system.model)
+
+
+@eqx.filter_jit
+def velocity(a: Float[Array, "B M"], points: Float[Array, "N 3"], system: Rotors) -> Float[Array, "N 3"]:
+    """Return the velocity (over ΩR) that all rotors and their ground induce at points of the common frame, over R."""
+    flows = [
+        jnp.einsum("amn,m->na", _flow_of(system.model, place, frame, system.ground, points), states)
+        for place, frame, states in zip(system.positions, system.frames, a, strict=True)
+    ]
+    return jnp.sum(jnp.stack(flows), axis=0)
