@@ -19,9 +19,8 @@ from jaxtyping import Array, Float
 
 from rotorjax.calibration.parameters import Parameter, ParameterSet
 from rotorjax.ground import Plane
-from rotorjax.potential.ground_source import correlation
 from rotorjax.potential.loading import thrust_coefficient
-from rotorjax.potential.model import FiniteState, FiniteStateModel, mass_flow_parameters
+from rotorjax.potential.model import FiniteState, FiniteStateModel, ground_matrix, mass_flow_parameters
 
 SHARPNESS = 2.0  # exponent of η, the paper's
 PRINTED_REACH = float((-np.log(np.pi / 7)) ** (-1 / SHARPNESS))  # where (π/7)^(η²) has fallen to 1/e
@@ -68,5 +67,5 @@ def taught_state(
     a = gain * tau / (mass_flow_parameters(model, tau) * induced / hover + climb)
     if model.ground is None:
         return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    c = correlation(modes, model.sources, model.ground, model.quadrature) @ a
+    c = ground_matrix(model, model.ground) @ a
     return FiniteState(a, c * jnp.where(model.sources.diagonal, 1.0, source))
