@@ -6,7 +6,7 @@ root of the height, the slope, the edge), split by symmetry into blocks that do 
 value decomposition. The interpolation is smooth: derivatives by height, slope and place are those of the interpolant.
 
 Rows: the L coefficients of the upward flow on the rotor's disk in the functions P̄_j^r (j + r even) of `disk_modes`,
-which are complete there but for harmonics above the sources' own, which a slope makes and which bear no load. Columns:
+which are complete there but for harmonics above the rotor's own, which bear no load. Columns:
 states at K + 1 nodes of the wake (one where it has no transit time), then the plane's velocity, uniform and by x. The
 source states themselves are those of `moving_ground.ground_states`.
 """
@@ -79,8 +79,8 @@ def _inverse(rows: tuple[tuple[int, ...], ...], count: int) -> np.ndarray:
 
 
 def disk_modes(model: FiniteStateModel) -> ModeTable:
-    """Functions of the ground's flow on the rotor disk: the harmonics of the sources, six terms or as many as fit."""
-    harmonics = int(model.sources.m.max())
+    """Functions of the ground's flow on the rotor disk: the rotor's harmonics and the first, six terms or fewer."""
+    harmonics = min(int(model.sources.m.max()), max(1, int(model.modes.m.max())))
     return ground_modes(harmonics, min(6, (15 - harmonics) // 2 + 1))
 
 

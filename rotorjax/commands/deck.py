@@ -1,0 +1,57 @@
+"""`rotorjax deck`: a rotor over a heaving, pitching deck, with or without an edge."""
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def register(commands: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = commands.add_parser(
+        "deck",
+        help="a rotor over a moving deck",
+        description="Simulate a rotor over a heaving, pitching deck with the dynamic finite-state model and write "
+        "history.nc, report.json, histories and disk as PNG and PDF, and on request animation.gif. "
+        "`rotorjax.potential.deck_case` shows a case file.",
+    )
+    parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
+    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
+    parser.add_argument("--gif", action="store_true", help="write the animation too")
+    parser.set_defaults(run=run)
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Simulate and write; the exit code."""
+    from tqdm import tqdm
+
+    from rotorjax import plotting
+    from rotorjax.io import netcdf
+    from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.potential import deck_output
+    from rotorjax.potential.deck_case import read_case
+    from rotorjax.potential.deck_run import run_case
+
+    case = read_case(chosen.case)
+    out = make_folder(chosen.out)
+    with tqdm(desc="deck", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
+        bar.set_postfix_str("tables and march")
+        data, figures = run_case(case)
+        bar.set_postfix_str("pictures")
+        netcdf.write(out / "history.nc", data)
+        found = deck_output.report(data, figures)
+        write_json(out / "report.json", found)
+        plotting.save(deck_output.histories(data), out / "histories")
+        plotting.save(deck_output.snapshots(data), out / "disk")
+        if chosen.gif:
+            bar.set_postfix_str("animation")
+            deck_output.animation(data, out / "animation.gif")
+    lines = {name: found["histories"][name] for name in ("height", "uniform", "cosine", "thrust")}
+    for name, row in lines.items():
+        print(f"{name:8s} " + "  ".join(f"{key} {row[key]:9.5f}" for key in ("first", "last", "min", "max")))
+    most = found["largest_difference_from_static"]
+    print(
+        f"{found['simulated_s']:.1f} s in {found['steps']} steps of {found['step_us']:.0f} µs; the mean inflow differs "
+        f"from the steady one by up to {100 * most['relative']:.1f} % (at {most['time_s']:.1f} s); "
+        f"{100 * found['ground_residual_max']:.1f} % is left on the deck at most: {out / 'report.json'}"
+    )
+    return 0

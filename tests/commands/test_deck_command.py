@@ -1,0 +1,83 @@
+"""`rotorjax deck` end to end."""
+
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from rotorjax.cli import main
+from rotorjax.io import netcdf
+
+LANDING = """
+[rotor]
+name = "caradonna_tung"
+[model]
+variant = "{variant}"
+radial_terms = 2
+[time]
+duration = {duration}
+steps_per_turn = 12
+[path]
+t = [0.0, {duration}]
+height = [1.4, 1.0]
+{edge}
+[deck]
+heave = 0.05
+heave_period = {duration}
+"""
+
+
+def case(tmp_path, variant="quasi-steady", duration=0.5, edge=""):
+    path = tmp_path / "case.toml"
+    path.write_text(LANDING.format(variant=variant, duration=duration, edge=edge))
+    return path
+
+
+@pytest.mark.slow
+def test_landing_writes_everything(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["deck", "--case", str(case(tmp_path)), "--out", str(out), "--gif"]) == 0
+    names = {"history.nc", "report.json", "histories.png", "histories.pdf", "disk.png", "disk.pdf", "animation.gif"}
+    assert {p.name for p in out.iterdir()} == names
+    report = json.loads((out / "report.json").read_text())
+    data = netcdf.read(out / "history.nc")
+    assert report["histories"]["uniform"]["last"] == pytest.approx(float(data["uniform"][-1]))
+    assert report["histories"]["uniform"]["last"] < 0.95 * report["histories"]["uniform"]["first"]
+    assert report["histories"]["thrust"]["last"] > report["histories"]["thrust"]["first"]
+    assert report["ground_residual_max"] < 0.03
+    np.testing.assert_allclose(data["uniform"][0], data["static_uniform"][0], rtol=0.02)
+    assert data["uniform"].attrs["units"] == "ΩR"
+    assert matplotlib.image.imread(out / "histories.png").std() > 0.05
+    assert "is left on the deck at most" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_flight_over_an_edge(tmp_path):
+    out = tmp_path / "out"
+    path = case(tmp_path, "dynamic", 0.4, "edge = [-1.4, 0.6]")
+    assert main(["deck", "--case", str(path), "--out", str(out)]) == 0
+    data = netcdf.read(out / "history.nc")
+    assert data["cosine"].max() > 0.001  # more inflow aft, where there is no deck
+    assert data["uniform"][-1] < data["uniform"][0]
+    assert float(data["ground_residual"].max()) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        (["--case", "{tmp}/none.toml", "--out", "{tmp}/out"], "No such file"),
+        (["--case", "{tmp}/case.toml", "--out", "{tmp}/case.toml/out"], "must be writable"),
+        (["--out", "{tmp}/out"], "--case"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(arguments, match, tmp_path, capsys):
+    case(tmp_path)
+    try:
+        code = main(["deck", *(a.format(tmp=tmp_path) for a in arguments)])
+    except SystemExit as stop:
+        code = stop.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert len(printed.err.strip().splitlines()) == 1
+    assert match in printed.err
