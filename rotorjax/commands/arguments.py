@@ -1,6 +1,7 @@
 """Arguments that several commands share."""
 
 import argparse
+from pathlib import Path
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -18,4 +19,14 @@ def add_harmonics(parser: argparse.ArgumentParser) -> None:
     """--harmonics."""
     parser.add_argument(
         "--harmonics", type=int, default=1, metavar="N", help="harmonics of the VPBFSM on a slope, 1 to 4 (1)"
+    )
+
+
+def add_calibration(parser: argparse.ArgumentParser) -> None:
+    """--calibration."""
+    parser.add_argument(
+        "--calibration",
+        type=Path,
+        metavar="FILE",
+        help="calibration.toml: the calibrated VPBFSM beside the printed one",
     )

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rotorjax.commands.arguments import add_harmonics, add_rotor
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -31,6 +31,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="numbers, with the keys of a case of summary.json")
     parser.add_argument("--netcdf", type=Path, metavar="FILE", help="all arrays, labelled")
     add_harmonics(parser)
+    add_calibration(parser)
     parser.set_defaults(run=run)
 
 
@@ -38,6 +39,8 @@ def run(chosen: argparse.Namespace) -> int:
     """Solve the case, print it and write what was asked for; the exit code."""
     from tqdm import tqdm
 
+    from rotorjax.calibration import apply
+    from rotorjax.calibration.calibration_file import load
     from rotorjax.io import netcdf
     from rotorjax.io.atomic import make_folder, write_json
     from rotorjax.study.record import summary_entry
@@ -49,6 +52,7 @@ def run(chosen: argparse.Namespace) -> int:
     settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick)
     check_case(case, settings)
     check_picture(chosen.plot)
+    calibration = None if chosen.calibration is None else load(chosen.calibration)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
         if path is not None:  # before the work, not after it
             make_folder(path.parent)
@@ -59,8 +63,13 @@ def run(chosen: argparse.Namespace) -> int:
 
         data, reference = single_case(case, settings, chosen.model, progress)
     print(table(data, settings, reference))
+    entry = summary_entry(data, reference)
+    if calibration is not None:
+        data = apply.add_calibrated(data, settings, calibration)
+        print(apply.table(data, reference, calibration))
+        entry |= {"calibrated": apply.entry(data, reference, calibration)}
     if chosen.json is not None:
-        write_json(chosen.json, summary_entry(data, reference))
+        write_json(chosen.json, entry)
     if chosen.netcdf is not None:
         netcdf.write(chosen.netcdf, data)
     if chosen.plot is not None:
