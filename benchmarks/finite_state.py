@@ -12,7 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.ground import Plane, plane
+from rotorjax.potential.blades import linear_blades, stations
+from rotorjax.potential.ground_source import DiskQuadrature
+from rotorjax.potential.ground_table import ground_table
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, inflow, mean_inflow, steady_state
+from rotorjax.potential.moving_ground import still
+from rotorjax.potential.over_ground import OverGround, controls, over_ground, simulate, trim
+from rotorjax.potential.wake_transport import wake_transport
 
 R, PSI = np.linspace(0.02, 0.99, 64), np.arange(72) * 2 * np.pi / 72
 
@@ -33,6 +39,65 @@ def measure(function: Callable, *arguments: object, repeats: int) -> dict[str, f
 
 def set_ground(model: FiniteStateModel, ground: jax.Array) -> FiniteStateModel:
     return eqx.tree_at(lambda m: m.ground, model, Plane(ground[0], ground[1]))
+
+
+def moving(harmonics: int, terms: int, variant: str, slope: float = 0.0, loads: bool = True) -> OverGround:
+    """A rotor over moving ground, heights 0.5 to 3."""
+    rotor = finite_state_model(
+        None, harmonics, terms, harmonics, 5, quadrature=DiskQuadrature(12, max(8, 4 * harmonics))
+    )
+    transport = wake_transport(3.3, 8) if variant == "dynamic" else None
+    table = ground_table(rotor, (0.5, 3.0), (-slope, slope), transport=transport, tolerance=1e-6)
+    at = stations(0.1, 10, max(6, 2 * harmonics + 2))
+    return over_ground(rotor, table, linear_blades(0.08) if loads else None, variant, transport, at)
+
+
+def march(model: OverGround, seconds: float, steps_per_turn: int, save_every: int) -> tuple[Callable, tuple, int]:
+    """A landing from 2 R to 0.7 R on a heaving deck at 27 rad/s; the function, its arguments and the steps."""
+    steps = round(seconds * 27.0 / (2 * np.pi) * steps_per_turn) // save_every * save_every
+    psi = jnp.linspace(0, steps * 2 * np.pi / steps_per_turn, steps + 1)
+    tau = jnp.zeros(len(model.rotor.modes)).at[0].set(2.6e-3)
+
+    def ground(psi: jax.Array) -> jax.Array:
+        down = psi / psi[-1]
+        return 2 - 1.3 * down**2 * (3 - 2 * down) - 0.06 * jnp.sin(0.03 * psi)
+
+    height = ground(psi)
+    climb = jnp.gradient(height + 0.06 * jnp.sin(0.03 * psi), psi)
+    slope = 0 * psi
+    motion = type(still(plane(1.0)))(height, slope, jnp.gradient(height, psi), slope)
+    start = trim(model, controls(still(plane(2.0)), model.rotor, jnp.deg2rad(8.0), tau=tau))
+
+    def run(collective: jax.Array) -> jax.Array:
+        inputs = controls(motion, model.rotor, collective, climb, tau=tau)
+        return simulate(model, start, psi, inputs, save_every).outputs.uniform
+
+    return run, (jnp.deg2rad(8.0),), steps
+
+
+def dynamic_cases() -> dict[str, dict[str, float]]:
+    """Steps of the moving model, a thousand rotors at once, and a landing of 60 s."""
+    results = {}
+    for name, settings in {
+        "quasi-steady_given_loads": (4, 6, "quasi-steady", 0.0, False),
+        "quasi-steady_linear_blades": (4, 6, "quasi-steady", 0.0, True),
+        "quasi-steady_pitching": (4, 6, "quasi-steady", 8.0, True),
+        "dynamic_given_loads": (4, 6, "dynamic", 0.0, False),
+        "dynamic_linear_blades": (4, 6, "dynamic", 0.0, True),
+    }.items():
+        run, arguments, steps = march(moving(*settings), 15.0, 32, 16)
+        found = measure(run, *arguments, repeats=9)
+        results[f"step_m4_6_terms_{name}"] = {**found, "step_us": 1e6 * found["median_s"] / steps}
+    run, (collective,), steps = march(moving(1, 3, "quasi-steady"), 1.0, 32, 1)
+    many = measure(jax.vmap(run), collective + jnp.linspace(-0.02, 0.02, 1000), repeats=3)
+    results["step_of_1000_rotors"] = {**many, "step_us": 1e6 * many["median_s"] / steps}
+    for name, settings in {
+        "dynamic_m1_pitching": (1, 3, "dynamic", 5.0),
+        "dynamic_m4": (4, 6, "dynamic", 0.0),
+    }.items():
+        run, arguments, steps = march(moving(*settings), 60.0, 32 if settings[0] == 4 else 16, 8)
+        results[f"landing_60_s_{name}"] = {**measure(run, *arguments, repeats=3), "steps": steps}
+    return results
 
 
 def main() -> None:
@@ -62,8 +127,12 @@ def main() -> None:
         "inflow_64x72_jacobian_by_ground": measure(jax.jacfwd(one), grounds[500], tau, repeats=20),
         "mean_inflow_of_1000_grounds": measure(batch, grounds, tau, repeats=5),
     }
+    results |= dynamic_cases()
     for name, result in results.items():
-        print(f"{name:34s} median {1e3 * result['median_s']:9.3f} ms   compile {result['compile_s']:6.2f} s")
+        print(
+            f"{name:44s} median {1e3 * result['median_s']:9.3f} ms   compile {result['compile_s']:6.2f} s"
+            + (f"   step {result['step_us']:8.1f} µs" if "step_us" in result else "")
+        )
     if options.json:
         options.json.write_text(json.dumps(results, indent=2) + "\n")
 
