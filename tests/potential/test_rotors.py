@@ -47,17 +47,25 @@ def test_coaxial_pair_between():
     assert np.all(np.diff(means[:, 1]) > 0)
 
 
-def test_side_by_side_tend_to_isolated_ones():
-    """Upwash beside the wake lowers the inflow; it dies out with the distance."""
-    gaps = np.array([2.1, 4.0, 8.0, 16.0])
+def test_side_by_side_in_one_plane_do_not_feel_each_other():
+    """A straight wake has no axial flow in its disk's plane outside the disk."""
+    system, a = solve([(0, 0, 0), (0, 2.05, 0)])
+    np.testing.assert_allclose(mean_inflows(a, system), V0, rtol=1e-12)
+
+
+def test_side_by_side_at_two_heights_tend_to_isolated_ones():
+    """The lower one sits in the weak upwash beside the wake, the upper one above it; both die out with the distance."""
     less = []
-    for gap in gaps:
-        system, a = solve([(0, 0, 0), (0, gap, 0)])
-        means = mean_inflows(a, system)
-        np.testing.assert_allclose(means[0], means[1], rtol=1e-12)
-        less.append(abs(float(means[0]) / V0 - 1))
-    assert less[3] < 1e-4
-    assert np.all(np.diff(less) <= 1e-9)
+    for gap in (2.1, 3.0, 5.0, 9.0, 17.0):
+        system, a = solve([(0, 0, 0), (0, gap, -0.5)])
+        less.append(np.array(mean_inflows(a, system)) / V0 - 1)
+    upper, lower = np.array(less).T
+    assert np.all(upper > 0)
+    assert np.all(lower < 0)
+    assert np.all(np.diff(upper) < 0)
+    assert np.all(np.diff(lower) > 0)
+    assert lower[0] < -0.005
+    assert abs(lower[-1]) < 1e-4
 
 
 def test_quadrotor_has_its_symmetry_and_senses_mirror():
