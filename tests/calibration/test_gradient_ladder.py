@@ -8,6 +8,7 @@ agree with central differences wherever it has one. Run with -s to see what is c
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -330,6 +331,11 @@ STATIC = {  # numbers and tables that no one differentiates
 }  # fmt: skip
 
 
+# Derivatives do not depend on the compiler's polish, which takes most of the time; the value is compared with that of
+# the usual compilation.
+QUICK = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
+
+
 @pytest.mark.parametrize("rung", RUNGS, ids=lambda rung: rung.covers[0])
 def test_ladder(rung):
     names = list(rung.points)
@@ -337,7 +343,7 @@ def test_ladder(rung):
     moves = jax.vmap(jnp.diag)(step_of(points))
     flat = lambda v: jnp.ravel(rung.function(v))  # noqa: E731
 
-    @jax.jit
+    @partial(jax.jit, compiler_options=QUICK)
     def climb(points, moved):
         return jax.vmap(flat)(moved), jax.vmap(jax.jacfwd(flat))(points), jax.vmap(jax.jacrev(flat))(points)
 
