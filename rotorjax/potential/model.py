@@ -53,6 +53,13 @@ class FiniteStateModel(eqx.Module):
     region: Region | None = None
     ground_radius: Float[Array, ""] | None = None
 
+    def __check_init__(self) -> None:
+        """Raise InputError where the modes' parities do not match their use."""
+        if self.modes.parity == "even" or not bool(self.modes.odd.any()):
+            raise InputError("Argument `modes` must have modes with n + m odd, which carry the load, but has none")
+        if self.sources.parity == "both":
+            raise InputError("Argument `sources` must be all even or all odd in j + r, but has parity 'both'")
+
 
 class FiniteState(eqx.Module):
     """Velocity states. a (M,): rotor; c (G,): ground sources, zero without ground; both over ΩR."""

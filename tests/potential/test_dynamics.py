@@ -174,6 +174,7 @@ def test_steady_unsteady_flow_is_the_steady_field():
     np.testing.assert_allclose(mine, a[0] @ axial_functions(model.modes, points), rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_skewed_steady_flow_below_the_disk_against_the_exact_one():
     """Costates in the reversed stream; with the skew not reversed the error is many times larger."""
     chi, errors = np.deg2rad(30.0), []

@@ -52,6 +52,7 @@ def test_projection_is_the_flow_on_the_disk():
     np.testing.assert_allclose(mine, flow, atol=2e-3 * float(jnp.abs(flow).max()))
 
 
+@pytest.mark.slow
 def test_moving_edge():
     model = finite_state_model(
         radial_terms=2, ground_harmonics=2, ground_parity="odd", quadrature=QUADRATURE, region=half_plane(0.0)
@@ -65,6 +66,7 @@ def test_moving_edge():
         np.testing.assert_allclose(found, exact, atol=1e-3 * float(jnp.abs(exact).max()))
 
 
+@pytest.mark.slow
 def test_derivatives_by_height_and_slope():
     table = ground_table(MODEL, (0.5, 1.9), (-8, 8))
     x = smooth_states(6, None)

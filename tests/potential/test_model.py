@@ -9,6 +9,7 @@ from rotorjax.ground import Plane, plane
 from rotorjax.potential import loading
 from rotorjax.potential.model import (
     FiniteState,
+    FiniteStateModel,
     finite_state_model,
     ground_normal_velocity_rms,
     inflow,
@@ -17,6 +18,7 @@ from rotorjax.potential.model import (
     steady_state,
     velocity,
 )
+from rotorjax.potential.modes import rotor_modes
 
 CT = 0.006
 ONE_TERM = jnp.array([np.sqrt(3) / 4 * CT])
@@ -92,6 +94,15 @@ def test_far_ground_is_no_ground():
     model, free = finite_state_model(plane(30.0)), finite_state_model()
     state = steady_state(model, THREE_TERMS)
     np.testing.assert_allclose(inflow(state, R, PSI, model), inflow(state, R, PSI, free), rtol=1e-4)
+
+
+def test_parities_must_match_their_use():
+    model = finite_state_model()
+    with pytest.raises(InputError, match=r"`modes` .* but has none"):
+        FiniteStateModel(model.sources, model.sources, None, model.correction, model.quadrature, "paper")
+    both = rotor_modes(0, 2, 1)
+    with pytest.raises(InputError, match="parity 'both'"):
+        FiniteStateModel(model.modes, both, None, model.correction, model.quadrature, "paper")
 
 
 def test_mass_flow_options():

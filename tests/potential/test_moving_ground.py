@@ -93,6 +93,7 @@ def test_rates_of_prescribed_motion_are_second_order():
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2, atol=0.1)
 
 
+@pytest.mark.slow
 def test_derivative_ladder():
     model = finite_state_model(harmonics=1, radial_terms=2, ground_harmonics=1)
 

@@ -100,6 +100,7 @@ def test_slow_heave_is_quasi_steady_and_fast_heave_is_not(models):
         assert abs(ratio[4] - found["static"][4] / found["static"][0]) > 0.3
 
 
+@pytest.mark.slow
 def test_order_of_accuracy(models):
     model, finals = models["quasi-steady"], []
     start = trim(model, at_rest(slope_deg=0.0))
@@ -126,6 +127,7 @@ def test_many_rotors_by_vmap(models):
     np.testing.assert_allclose(eqx.filter_vmap(last)(pitches)[3], last(pitches[3]), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_gradient_through_a_march(models):
     model, psi = models["dynamic"], jnp.linspace(0, 4, 21)
     start = trim(model, at_rest(slope_deg=0.0))
@@ -153,6 +155,7 @@ def test_linear_model_is_named_and_exported(models):
     assert to_dataset(linear)["A"].shape == (54, 54)
 
 
+@pytest.mark.slow
 def test_linear_model_predicts_a_step_of_collective(models):
     model, now = models["quasi-steady"], at_rest()
     state, psi, jump = trim(model, now), jnp.linspace(0, 30, 301), 0.001

@@ -117,6 +117,7 @@ def test_slope_and_region_together():
     assert left < 0.03
 
 
+@pytest.mark.slow
 def test_derivative_by_the_edge():
     def mean(edge):
         return sweep(jnp.stack([edge]))[1][0]

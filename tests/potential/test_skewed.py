@@ -41,6 +41,7 @@ def along_streamline(modes, point, chi):
     return result + quad_vec(lambda u: f(1 / u) / u**2, 0, 1 / ends[-1], **settings)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [PRESSURE, SOURCE], ids=["pressure", "source"])
 @pytest.mark.parametrize("degrees", [20.0, 50.0])
 def test_flow_is_the_acceleration_integrated_along_streamlines(modes, degrees):
@@ -50,12 +51,14 @@ def test_flow_is_the_acceleration_integrated_along_streamlines(modes, degrees):
         np.testing.assert_allclose(mine[:, :, i], along_streamline(modes, point, chi), atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [PRESSURE, SOURCE], ids=["pressure", "source"])
 def test_axial_stream_is_the_closed_form(modes):
     points = jnp.array(list(PLACES.values()))
     np.testing.assert_allclose(FLOW(modes, points, jnp.array(0.0)), field_functions(modes, points), atol=1e-6)
 
 
+@pytest.mark.slow
 def test_disk_flow_of_finite_states_converges_to_it():
     """a = M⁻¹L(X)τ at unit mass flow: the finite states' axial flow on the disk, more of them nearer."""
     chi = np.deg2rad(30.0)
