@@ -40,7 +40,8 @@ class Verdict(NamedTuple):
     rms: √(Σr²/N). left (): the largest Gauss–Newton step left, over the range of its parameter. rank (): smallest over
     largest singular value of the Jacobian with respect to parameters over their ranges. covariance (P, P):
     s²(JᵀJ)⁻¹ with s² = Σr²/(N − P), NaN where N = P or the data do not determine a parameter. It takes the
-    differences for independent; where neighbours miss the target together, as stations of one inflow do, it is a lower bound.
+    differences for independent; where neighbours miss the target together, as stations of one inflow do, it is a lower
+    bound.
     """
 
     rms: Float[Array, ""]
