@@ -166,8 +166,8 @@ def costates(
     return jnp.concatenate([jax.lax.scan(back, last, rows, reverse=True)[1], last[None]])
 
 
-def _at(time: Float[Array, "*N"], psi: Float[Array, " T"], rows: Float[Array, "T M"]) -> Float[Array, "M ..."]:
-    """Rows interpolated linearly in time, held constant outside the window."""
+def rows_at(time: Float[Array, "*N"], psi: Float[Array, " T"], rows: Float[Array, "T M"]) -> Float[Array, "M ..."]:
+    """Return rows interpolated linearly in time, held constant outside the window."""
     return jax.vmap(lambda column: jnp.interp(time, psi, column), in_axes=1)(rows)
 
 
@@ -197,6 +197,6 @@ def axial_velocity(
     foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.zeros_like(z)], axis=-1)
     phi, disk = pressure_functions(model.modes, mirror), pressure_functions(model.modes, foot)
     passed = time - below / (speed * jnp.cos(chi))
-    wake = jnp.sum((_at(passed, psi, a) + _at(passed, psi, delta)) * disk, axis=0)
-    wake = wake - jnp.tensordot(_at(time, psi, delta), phi, 1)
-    return jnp.where(z >= 0, jnp.tensordot(_at(time, psi, a), phi, 1), wake)
+    wake = jnp.sum((rows_at(passed, psi, a) + rows_at(passed, psi, delta)) * disk, axis=0)
+    wake = wake - jnp.tensordot(rows_at(time, psi, delta), phi, 1)
+    return jnp.where(z >= 0, jnp.tensordot(rows_at(time, psi, a), phi, 1), wake)

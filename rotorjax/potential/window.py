@@ -13,7 +13,8 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import RotorInputs, axial_velocity, costates, flow_matrices, rate_table
+from rotorjax.potential.dynamics import RotorInputs, costates, flow_matrices, rate_table, rows_at
+from rotorjax.potential.field import velocity_functions
 from rotorjax.potential.model import FiniteStateModel
 from rotorjax.potential.moving_ground import require_increasing
 
@@ -33,6 +34,34 @@ def require_window(psi: Float[Array, " T"], depth: float, speed: float) -> None:
         )
 
 
+@eqx.filter_jit
+def velocity_at(
+    time: Float[Array, ""],
+    points: Float[Array, "N 3"],
+    psi: Float[Array, " T"],
+    a: Float[Array, "T M"],
+    delta: Float[Array, "T M"],
+    speed: Float[Array, ""],
+    model: FiniteStateModel,
+    chi: Float[Array, ""] | float = 0.0,
+) -> Float[Array, "N 3"]:
+    """Return the rotor's velocity (hub frame, over ΩR) at hub-frame points and one time; see `dynamics.axial_velocity`.
+
+    Below the disk v_A(t) = v_B(t₀) ± (v_C†(t₀) − v_D†(t)), plus for the axial, minus for the in-plane components: the
+    acceleration of a pressure mode is even along the axis and odd across it.
+    """
+    x, y, z = jnp.moveaxis(points, -1, 0)
+    below = jnp.maximum(-z, 0.0)
+    foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.maximum(z, 0.0)], axis=-1)
+    mirror = jnp.stack([x, y, jnp.abs(z)], axis=-1)
+    passed = time - below / (speed * jnp.cos(chi))
+    at_foot, at_mirror = velocity_functions(model.modes, foot), velocity_functions(model.modes, mirror)
+    flow = jnp.einsum("cmn,mn->nc", at_foot, rows_at(passed, psi, a))
+    adjoint = jnp.einsum("cmn,mn->nc", at_foot, rows_at(passed, psi, delta))
+    adjoint = adjoint - jnp.einsum("cmn,m->nc", at_mirror, rows_at(time, psi, delta))
+    return flow + jnp.where(z[:, None] < 0, adjoint * jnp.array([-1.0, -1.0, 1.0], points.dtype), 0.0)
+
+
 def flow_over_window(
     psi: Float[Array, " T"],
     a: Float[Array, "T M"],
@@ -42,8 +71,8 @@ def flow_over_window(
     speed: float,
     model: FiniteStateModel,
     chi: float = 0.0,
-) -> Float[Array, "S N"]:
-    """Return the rotor's downward velocity (over ΩR) at hub-frame points and times of a window, by costates.
+) -> Float[Array, "S N 3"]:
+    """Return the rotor's velocity (hub frame, over ΩR) at hub-frame points and times of a window, by costates.
 
     psi, a, inputs: the window's instants, states and inputs; times: inside it, a transit time after its start and
     rather before its end. speed: convection speed of the wake, over ΩR; chi: its skew (rad). Raises InputError where
@@ -59,7 +88,7 @@ def flow_over_window(
             f"spans [{float(times.min()):.6g}, {float(times.max()):.6g}]"
         )
     delta = costates(psi, a, inputs, model, chi != 0.0)
-    one = eqx.filter_jit(lambda t: axial_velocity(t, points, psi, a, delta, jnp.asarray(speed), model, chi))
+    one = eqx.filter_jit(lambda t: velocity_at(t, points, psi, a, delta, jnp.asarray(speed), model, chi))
     return jax.lax.map(one, times)
 
 

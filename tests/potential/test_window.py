@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import costates, hover_inputs
-from rotorjax.potential.field import axial_functions
+from rotorjax.potential.dynamics import RotorInputs, costates, hover_inputs
+from rotorjax.potential.field import field_functions, pressure_functions
+from rotorjax.potential.matrices import apparent_mass, damping
 from rotorjax.potential.model import finite_state_model, steady_state
-from rotorjax.potential.window import delayed_costates, flow_over_window, forgetting_rate, require_window
+from rotorjax.potential.modes import rotor_modes
+from rotorjax.potential.window import delayed_costates, flow_over_window, forgetting_rate, require_window, velocity_at
 
 MODEL = finite_state_model()
 TAU = jnp.array([np.sqrt(3) / 4 * 0.006, 3e-4, 1e-4])
@@ -42,7 +44,41 @@ def test_flow_in_steady_motion_is_the_steady_field():
     points = jnp.array([[0.3, 0.2, 0.4], [0.3, 0.2, -0.7], [1.4, 0.0, -0.3]])
     times = jnp.array([60.0, 90.0])
     flow = flow_over_window(PSI, a, inputs, times, points, SPEED, MODEL)
-    np.testing.assert_allclose(flow, jnp.stack([A @ axial_functions(MODEL.modes, points)] * 2), rtol=1e-9)
+    steady = jnp.einsum("cmn,m->nc", field_functions(MODEL.modes, points), A)
+    np.testing.assert_allclose(flow, jnp.stack([steady] * 2), rtol=1e-9, atol=1e-14)
+
+
+def along_streamline(x, z, omega, time):
+    """∫ ∇Φ₁ sin ω(t−s) ds along the path of the fluid particle: the exact linear flow at unit speed, x and z."""
+    node, weight = np.polynomial.legendre.leggauss(40)
+    node, weight = (node + 1) / 2, weight / 2
+    edges = np.concatenate([np.linspace(0, 5 + abs(z), 11), np.linspace(5 + abs(z), 180, 60)[1:]])
+    edges = np.sort(np.append(edges, max(-z, 0)))
+    s = (edges[:-1, None] + np.diff(edges)[:, None] * node).ravel()
+    step = (np.diff(edges)[:, None] * weight).ravel()
+    points = jnp.stack([jnp.full(s.size, x), jnp.zeros(s.size), jnp.array(z + s)], axis=-1)
+    slope = jax.vmap(jax.grad(lambda p: pressure_functions(rotor_modes(0, 1), p)[0]))(points)
+    return (step * np.sin(omega * (time - s))) @ np.array(slope)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("omega", [0.3, 1.0])
+def test_both_components_against_integration_along_streamlines(omega):
+    time, places = 120.0, [(0.4, 0.5), (0.4, -0.5), (0.6, -2.0), (1.5, -1.0)]
+    exact = np.array([along_streamline(x, z, omega, time) for x, z in places])
+    points, errors = jnp.array([[x, 0.0, z] for x, z in places]), []
+    psi = jnp.linspace(0, 200, 4001)
+    for odd, even in ((2, 0), (4, 3), (7, 7)):
+        model = finite_state_model(radial_terms=odd, even_terms=even)
+        d, mass = damping(model.modes, model.modes), apparent_mass(model.modes, model.modes)
+        response = np.linalg.solve(1j * omega * mass + d, d[:, 0]) * 1e-7
+        a = jnp.array((np.exp(1j * omega * np.array(psi))[:, None] * response).imag)
+        tau = jnp.zeros_like(a).at[:, 0].set(1e-7 * jnp.sin(omega * psi))
+        delta = costates(psi, a, RotorInputs(tau, jnp.zeros_like(psi), jnp.ones_like(psi)), model, skewed=False)
+        mine = velocity_at(jnp.array(time), points, psi, a, delta, jnp.array(1.0), model) * 1e7
+        errors.append(np.abs(mine - exact).max(axis=0)[[0, 2]])
+    assert np.all(errors[2] < errors[0])
+    assert np.all(errors[2] < 0.04)  # of amplitudes of about 1 and 2.5
 
 
 def test_flow_does_not_depend_on_a_longer_window():
