@@ -18,6 +18,7 @@ paper nor the tables' source applies it.
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -65,11 +66,14 @@ def section_loads(
     collective: Float[Array, "*#n"] | None = None,
     *,
     simple_sweep: bool = False,
+    span_mean: Float[Array, "R R"] | None = None,
 ) -> SectionLoads:
     """Loads of sections at r (over R) in the velocities u_T, u_P (over ΩR).
 
     collective: pitch without twist (rad), the operating point's by default; give θ₀ + θ₁c cos ψ + θ₁s sin ψ for cyclic
-    pitch. Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite derivatives.
+    pitch. span_mean: matrix that averages along the span (`span_averages`); then the last axis is the span and stall
+    follows the averaged angle. Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite
+    derivatives.
     """
     u_t, u_p, r = jnp.broadcast_arrays(u_tangential, u_perpendicular, r)
     pitch = (operating.collective if collective is None else collective) + geometry.twist(rotor, r)
@@ -80,7 +84,10 @@ def section_loads(
     speed = jnp.where(still, 0.0, jnp.sqrt(safe_t**2 + u_p**2))
     alpha = pitch - phi
     mach = speed * operating.tip_mach(rotor.radius)
-    cl, cd = _coefficients(rotor, r, alpha, mach, simple_sweep)
+    entry = alpha if span_mean is None else alpha @ span_mean.T
+    cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
+    if span_mean is not None:
+        cl = cl + attached_slope(rotor, r, mach, simple_sweep) * (alpha - entry)
     half_chord = 0.5 * geometry.chord(rotor, r)
     dynamic = half_chord * (u_t**2 + u_p**2)
     return SectionLoads(
@@ -93,6 +100,21 @@ def section_loads(
         inflow_angle=phi,
         mach=mach,
     )
+
+
+def span_averages(r: Float[Array, " R"], widths: Float[Array, " R"], length: Float[Array, " R"]) -> Float[Array, "R R"]:
+    """Matrix that takes a Gaussian mean along the span about each section; all lengths over R.
+
+    widths: panel widths. length: standard deviation at each section. A straight line in r is kept exactly inside the
+    span, and at its ends too: weights are those of local linear regression. For `section_loads`: a polar is the answer
+    of a whole stretch of wing, and separation does not come and go within a chord of span. Entered panel by panel, a
+    falling lift curve makes lifting-line theory ill-posed: narrow panels stall and recover in turn, with several
+    solutions and none (folds). Averaged, local differences keep the attached slope and stall follows the mean.
+    """
+    gap = r[None, :] - r[:, None]
+    weight = widths * jnp.exp(-0.5 * (gap / length[:, None]) ** 2)
+    total, first, second = (jnp.sum(weight * gap**n, axis=1, keepdims=True) for n in range(3))
+    return weight * (second - first * gap) / (second * total - first**2)
 
 
 def disk_loading(rotor: Rotor, loads: SectionLoads) -> Float[Array, "*n"]:
@@ -126,6 +148,16 @@ def rotor_coefficients(
     profile = total(r * drag * jnp.cos(phi))
     thrust = total(lift * jnp.cos(phi) - drag * jnp.sin(phi))
     return RotorCoefficients(thrust, induced + profile, induced, profile)
+
+
+def attached_slope(rotor: Rotor, r, mach, simple_sweep: bool = False) -> Float[Array, "*n"]:
+    """Lift slope (per rad) at zero angle of attack, where the flow is attached."""
+
+    def lift(alpha):
+        return _coefficients(rotor, r, alpha, mach, simple_sweep)[0]
+
+    still = jnp.zeros_like(mach)
+    return jax.jvp(lift, (still,), (jnp.ones_like(mach),))[1]
 
 
 def _coefficients(rotor, r, alpha, mach, simple_sweep):

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.rotor.blade_element import SectionLoads, section_loads
+from rotorjax.rotor.blade_element import SectionLoads, section_loads, span_averages
 from rotorjax.wake.field import node_velocities
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.segments import releases
@@ -39,6 +39,7 @@ def blade_loads(model: FreeWake, control: Float[Array, "K R 3"], inputs: WakeInp
         model.stations - control[..., 1],
         -control[..., 2],
         collective=inputs.collective,
+        span_mean=span_averages(model.stations, model.widths, model.settings.stall_chords * model.chords),
     )
 
 

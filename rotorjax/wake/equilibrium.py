@@ -8,6 +8,7 @@ products, with no further preconditioner.
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -54,6 +55,10 @@ def evaluate(model: FreeWake, x: Unknowns) -> Evaluation:
     state, start = full_state(model, x)
     velocities = node_velocities(model, state)
     return Evaluation(state, velocities, blade_loads(model, velocities.control, inputs_of(model)), start)
+
+
+evaluated = eqx.filter_jit(evaluate)
+"""`evaluate`, compiled."""
 
 
 def transported(model: FreeWake, found: Evaluation) -> Unknowns:

@@ -16,9 +16,13 @@ from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.wake.equilibrium import Unknowns, advance, residual
 from rotorjax.wake.model import FreeWake
-from rotorjax.wake.start import prescribed, with_the_ground
+from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
+from rotorjax.wake.start import laid_level, prescribed, with_the_ground
 
 Progress = Callable[[str, float], None]
+
+STEEPER = np.deg2rad(7.5)
+"""Most that the ground tilts in the first step of a continuation."""
 
 WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
@@ -34,6 +38,7 @@ class Search:
     why: str = ""
     iterations: int = 0
     residuals: list[float] = field(default_factory=list)
+    inverse: HarmonicInverse | None = None
 
     def from_nothing(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
         """Wake of a model without ground, by way of the auxiliary flow."""
@@ -60,7 +65,8 @@ class Search:
             height = 1 / ((1 - s) / here.ground.height + s / there.ground.height)
             return eqx.tree_at(lambda m: m.ground.height, model, height)
 
-        return self.follow(between, x, stage, 1.0)
+        tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
+        return self.follow(between, x, stage, min(1.0, STEEPER / max(abs(tilt), 1e-9)))
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
@@ -74,14 +80,17 @@ class Search:
 
         def step(guess, s, memory):
             found = self.newton(at(s), guess, self.tol if s == 1 else max(self.tol, 1e-5))
+            if found.converged and 0 < s < 1:
+                self.prepare(at(s), found.x)
             self.note(f"{stage} {s:.2f}", found)
             return found
 
         def carry(x, here, there):
             return with_the_ground(x, at(here).ground, at(there).ground)
 
+        self.prepare(at(0.0), x)
         branch: Branch = continuation(
-            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=0.02, easy=5, jump=0.3, carry=carry
+            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=0.05, easy=5, jump=0.3, carry=carry
         )
         if not branch.outcomes:
             self.ok, self.why = False, branch.why
@@ -92,7 +101,14 @@ class Search:
 
     def newton(self, model: FreeWake, x: Unknowns, tol: float) -> Outcome:
         """Newton-Krylov at one model."""
-        return newton(residual, x, model, linear=Krylov(forcing=0.03), tol=tol, max_iterations=12)
+        linear = Krylov(forcing=0.03, precondition=self.inverse, restart=120, restarts=1)
+        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=10)
+
+    def prepare(self, model: FreeWake, x: Unknowns) -> None:
+        """Make the preconditioner for a wake that is not axisymmetric."""
+        if x.near.shape[0] > 1 and model.ground is not None:
+            level = eqx.tree_at(lambda m: m.ground.slope, model, jnp.zeros_like(model.ground.slope))
+            self.inverse = harmonic_inverse(level, laid_level(x, model.ground), x.near.shape[0])
 
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""

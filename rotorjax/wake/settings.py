@@ -45,6 +45,9 @@ class WakeSettings(eqx.Module):
         inboard_decay: rate per turn at which the inboard filaments lose strength: vorticity of both signs that lies
             side by side in the inner sheet diffuses and cancels, the tip vortex's does not.
         taper_turns: turns over which all strengths fade at the very end, so that the cut end induces nothing abrupt.
+        stall_chords: standard deviation, in chords, of the mean along the span with which the aerofoil's polar is
+            entered (blade_element.span_averages); without it the root of a rotor near the ground has several stalled
+            states and, between them, none.
         circulation_lag: time constant (rad) of the filter between blade-element and bound circulation.
     """
 
@@ -67,6 +70,7 @@ class WakeSettings(eqx.Module):
     self_induction_core: Float[Array, ""]
     inboard_decay: Float[Array, ""]
     taper_turns: Float[Array, ""]
+    stall_chords: Float[Array, ""]
     circulation_lag: Float[Array, ""]
 
     @property
@@ -101,7 +105,7 @@ def wake_settings(
     near_wake_deg: float = 90.0,
     free_turns: float = 4.0,
     closure_turns: int = 4,
-    azimuths: int = 12,
+    azimuths: int = 8,
     inboard: tuple[float, ...] = (0.45,),
     roll_up: RollUp = "impulse",
     release: float = 0.975,
@@ -115,6 +119,7 @@ def wake_settings(
     self_induction_core: float = 0.01,
     inboard_decay: float = 0.6,
     taper_turns: float = 1.5,
+    stall_chords: float = 0.5,
     circulation_lag: float = 0.1,
 ) -> WakeSettings:
     """Make settings from plain numbers; the defaults suit hover in and out of ground effect.
@@ -158,12 +163,13 @@ def wake_settings(
     positive = {"sharpness": sharpness, "tip_core": tip_core, "inboard_core": inboard_core, "near_core": near_core}
     positive |= {"control_core": control_core, "bound_core_chords": bound_core_chords, "taper_turns": taper_turns}
     positive |= {"self_induction_core": self_induction_core, "circulation_lag": circulation_lag}
+    positive |= {"stall_chords": stall_chords}
     for name, value in positive.items():
         check_number(name, value, 0.0, open_=True)
     for name, value in (("turbulence", turbulence), ("inboard_decay", inboard_decay)):
         check_number(name, value, 0.0)
     arrays = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, bound_core_chords)
-    arrays += (self_induction_core, inboard_decay, taper_turns, circulation_lag)
+    arrays += (self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
     return WakeSettings(
         panels,
         age_step_deg,
@@ -178,5 +184,5 @@ def wake_settings(
 
 
 def quick_settings(**overrides) -> WakeSettings:
-    """Coarser settings for a first look: fewer panels, turns and azimuths."""
-    return wake_settings(**{"panels": 12, "free_turns": 3.0, "closure_turns": 3, "azimuths": 8} | overrides)
+    """Coarser settings for a first look: fewer panels and turns."""
+    return wake_settings(**{"panels": 12, "free_turns": 3.0, "closure_turns": 3} | overrides)

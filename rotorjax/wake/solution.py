@@ -16,7 +16,7 @@ import numpy as np
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading, rotor_coefficients
 from rotorjax.wake.clock import Clock
-from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluate, spread, transported
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, spread, transported
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.search import Progress, Search, over_distant_ground
@@ -122,9 +122,9 @@ def _fits(start: Solution, model: FreeWake) -> bool:
 
 def _read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
     """Evaluate the wake and collect what a user wants of it."""
-    found: Evaluation = _evaluate(model, x)
+    found: Evaluation = evaluated(model, x)
     moved = transported(model, found)
-    once_more = _evaluate(model, moved)
+    once_more = evaluated(model, moved)
     stations, widths = model.stations, model.widths
     now = rotor_coefficients(model.rotor, found.loads, stations, widths)
     then = rotor_coefficients(model.rotor, once_more.loads, stations, widths)
@@ -162,11 +162,6 @@ def _read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solutio
     )
     wall, compiling = clock.read()
     return replace(solution, wall_time_s=wall, compile_time_s=compiling)
-
-
-@eqx.filter_jit
-def _evaluate(model: FreeWake, x: Unknowns) -> Evaluation:
-    return evaluate(model, x)
 
 
 _velocity = eqx.filter_jit(velocity)

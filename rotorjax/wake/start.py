@@ -70,3 +70,19 @@ def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> U
         return rotate_about_shaft(moved, -at)
 
     return x._replace(near=move(x.near), far=move(x.far))
+
+
+def laid_level(x: Unknowns, ground: Plane) -> Unknowns:
+    """Axisymmetric wake (K = 1) like that of a slope: its nodes sheared down or up to level ground, then averaged.
+
+    All above the ground, and more so than by with_the_ground: a mean of nodes under it would be no wake.
+    """
+    at = 2 * jnp.pi / x.near.shape[0] * jnp.arange(x.near.shape[0])[:, None, None]
+
+    def move(nodes):
+        hub = rotate_about_shaft(nodes, at)
+        above = jnp.clip(ground.distance(hub) / (ground.height * jnp.cos(ground.slope)), 0, 1)
+        lowered = hub[..., 2] - (1 - above**2) * hub[..., 0] * jnp.tan(ground.slope)
+        return jnp.mean(rotate_about_shaft(hub.at[..., 2].set(lowered), -at), axis=0, keepdims=True)
+
+    return Unknowns(move(x.near), move(x.far), jnp.mean(x.gamma_bound, axis=0, keepdims=True))

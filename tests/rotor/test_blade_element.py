@@ -162,3 +162,57 @@ def test_vmap_over_pitch_equals_broadcasting(rotor, point):
     ones = jnp.ones((3, 1))
     at_once = section_loads(rotor, point, R, ones * R, 0.05 * ones * R, pitch[:, None])
     np.testing.assert_allclose(mapped.dlift, at_once.dlift, rtol=1e-13)
+
+
+def test_span_averages_keep_straight_lines():
+    """Inside the span and at its ends, with uneven panels and a chord that varies."""
+    average = blade_element.span_averages(R, WIDTHS, 0.05 + 0.1 * R)
+    np.testing.assert_allclose(average @ (2.0 - 3.0 * R), 2.0 - 3.0 * R, rtol=1e-12)
+
+
+def test_span_average_leaves_a_linear_section_alone(rotor, point):
+    u_p = 0.05 * jnp.sin(7 * R)
+    average = blade_element.span_averages(R, WIDTHS, jnp.full_like(R, 0.1))
+    plain = section_loads(rotor, point, R, R, u_p)
+    averaged = section_loads(rotor, point, R, R, u_p, span_mean=average)
+    np.testing.assert_allclose(averaged.cl, plain.cl, rtol=1e-10)
+
+
+def _wing_solutions(span_mean, starts):
+    """Distinct circulations of an elliptic-root wing in stall, by Newton from random starts: 24 narrow panels."""
+    panels, chord = 24, 0.12
+    edges = jnp.linspace(-1, 1, panels + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    rise = (jnp.eye(panels, panels + 1) - jnp.eye(panels, panels + 1, 1)).T
+    wash = (1 / (4 * jnp.pi * (middle[:, None] - edges[None, :]))) @ rise
+    average = blade_element.span_averages(middle, jnp.diff(edges), jnp.full_like(middle, 0.5 * chord))
+    average = average if span_mean else jnp.eye(panels)
+
+    def lift(alpha):
+        """Attached to 12°, then falling at 4 per rad, smoothly."""
+        return 6.0 * alpha - 10.0 * 0.02 * jax.nn.softplus((alpha - np.deg2rad(12)) / 0.02)
+
+    def residual(gamma):
+        alpha = np.deg2rad(15) - wash @ gamma
+        entry = average @ alpha
+        return gamma - 0.5 * chord * (lift(entry) + 6.0 * (alpha - entry))
+
+    def newton(_, gamma):
+        step = jnp.linalg.solve(jax.jacfwd(residual)(gamma), -residual(gamma))
+        return gamma + step * jnp.minimum(1.0, 0.02 / jnp.max(jnp.abs(step)))
+
+    ends = jax.jit(jax.vmap(lambda start: jax.lax.fori_loop(0, 60, newton, start)))(starts)
+    found = []
+    for gamma in ends:
+        if float(jnp.max(jnp.abs(residual(gamma)))) < 1e-10 and not any(
+            jnp.allclose(gamma, g, atol=1e-6) for g in found
+        ):
+            found.append(gamma)
+    return found
+
+
+def test_stalled_wing_has_one_solution_with_span_averages_and_many_without():
+    """The reason for span_averages: a falling lift curve on panels narrower than a chord."""
+    starts = 0.07 + 0.03 * jax.random.normal(jax.random.PRNGKey(1), (12, 24))
+    assert len(_wing_solutions(True, starts)) == 1
+    assert len(_wing_solutions(False, starts)) > 1

@@ -1,0 +1,86 @@
+"""The inverse Jacobian of the axisymmetric wake, as a preconditioner for the wake over a slope.
+
+Over level ground the Jacobian of the residual (equilibrium.py) is block-circulant in the slices: a discrete Fourier
+transform over the azimuth takes it to one matrix J_p for each harmonic, which is inverted outright. Over a slope it is
+still close.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, Complex
+
+from rotorjax.wake.dynamics import blade_loads, inputs_of
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluated, full_state, transported
+from rotorjax.wake.field import Velocities
+from rotorjax.wake.influence import velocity_response
+from rotorjax.wake.model import FreeWake
+from rotorjax.wake.segments import releases
+
+
+class HarmonicInverse(eqx.Module):
+    """Inverse of J_p for p = 0 … K/2, [K/2 + 1, n, n], over the n unknowns of a slice."""
+
+    inverse: Complex[Array, "P n n"]
+
+    def __call__(self, v: Unknowns, x: Unknowns, model: FreeWake) -> Unknowns:
+        """Return J⁻¹ v for unknowns of K slices; x and model are not looked at."""
+        slices = v.near.shape[0]
+        solved = jnp.einsum("pij,pj->pi", self.inverse, jnp.fft.rfft(_rows(v), axis=0))
+        back = ravel_pytree(_first(v))[1]
+        return jax.vmap(back)(jnp.fft.irfft(solved, slices, axis=0))
+
+
+def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int) -> HarmonicInverse:
+    """Make the preconditioner for K slices from an axisymmetric wake (K = 1) over level ground or none."""
+    blades = model.rotor.blades
+    found = evaluated(model, x)
+    half = [velocity_response(model, found.state, jnp.asarray(2 * np.pi * q / blades)) for q in range(blades // 2 + 1)]
+    # the derivative is real, so that of −q is the conjugate of that of q
+    whole = [half[q] if q < len(half) else jnp.conj(half[blades - q]) for q in range(blades)]
+    matrix = _jacobian(model, x, found, jnp.stack([whole[p % blades] for p in range(slices // 2 + 1)]), slices)
+    return HarmonicInverse(jnp.linalg.inv(matrix))
+
+
+@eqx.filter_jit
+def _jacobian(model: FreeWake, x: Unknowns, found: Evaluation, responses: Complex[Array, "P N 3 m"], slices: int):
+    """J_p [P, n, n]: a unit disturbance of each unknown of slice 0, followed through one pass."""
+    one, unravel = ravel_pytree(_first(x))
+    state, state_of = ravel_pytree(_first(found.state))
+    here = jax.tree.map(lambda a: jnp.repeat(a, slices, axis=0), (x, found))
+    of_nodes = np.cumsum([len(model.stations), x.near[0].size // 3])
+
+    def to_state(column):
+        """Disturbance [K, m] of the states."""
+        pushed = jax.tree.map(lambda d, a: jnp.zeros_like(a).at[0].set(d), unravel(column), here[0])
+        return _rows(jax.jvp(lambda y: full_state(model, y)[0], (here[0],), (pushed,))[1])
+
+    def to_unknowns(moved, v):
+        """Disturbance [K, n] of the wake that is produced, from those of states [K, m] and velocities [K, N, 3]."""
+        parts = jnp.split(v, of_nodes, axis=1)
+        velocities = Velocities(*(p.reshape(a.shape) for p, a in zip(parts, here[1].velocities, strict=True)))
+        loads = jax.jvp(
+            lambda control: blade_loads(model, control, inputs_of(model)),
+            (here[1].velocities.control,),
+            (velocities.control,),
+        )[1]
+        start = jax.vmap(lambda t: jax.jvp(lambda s: releases(model, state_of(s)), (state,), (t,))[1])(moved)
+        change = Evaluation(jax.vmap(state_of)(moved), velocities, loads, start)
+        return _rows(jax.jvp(lambda e: transported(model, e), (here[1],), (change,))[1])
+
+    states = jax.vmap(to_state)(jnp.eye(one.size))
+    response = jnp.einsum("pnim,cpm->cpni", responses, jnp.fft.rfft(states, axis=1))
+    columns = jax.vmap(to_unknowns)(states, jnp.fft.irfft(response, slices, axis=1))
+    return jnp.einsum("cpn->pnc", jnp.fft.rfft(columns, axis=1)) - jnp.eye(one.size)
+
+
+def _first(tree):
+    """The first slice."""
+    return jax.tree.map(lambda a: a[0], tree)
+
+
+def _rows(tree) -> Array:
+    """Slices as rows, K of them."""
+    return jax.vmap(lambda one: ravel_pytree(one)[0])(tree)
