@@ -93,7 +93,9 @@ def distribution(
     tau: Float[Array, " M"], r: Float[Array, " R"], psi: Float[Array, " K"], modes: ModeTable
 ) -> Float[Array, "K R"]:
     """Return dC_T/dr̄ = 4 r̄ Σ τ P̄_n^m(ν) {cos, sin} mψ at azimuths psi (rad) and radii r (over R); inverse of Eq. 2."""
-    nu = jnp.sqrt(jnp.where(r < 1, 1 - r * r, 0.0))
+    inside = r < 1
+    # the root's slope is infinite at the edge: there the loading is zero with a zero slope
+    nu = jnp.where(inside, jnp.sqrt(jnp.where(inside, 1 - r * r, 1.0)), 0.0)
     return jnp.einsum("m,mr,mk->kr", tau, shaping(modes, r) * (4 * r * nu), azimuthal(modes, psi))
 
 

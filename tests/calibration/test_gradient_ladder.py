@@ -182,6 +182,7 @@ RUNGS = [
             "τ = 0": ([0.7, 0.3, *[0.0] * M], True),
             "axis": ([0.0, 0.3, *LOADED], True),
             "near the disk edge": ([1 - 1e-4, 0.3, *LOADED], [False, *[True] * (M + 1)]),
+            "disk edge": ([1.0, 0.3, *LOADED], [False, *[True] * (M + 1)]),
         },
     ),
     Rung(
