@@ -235,28 +235,49 @@ def report_memory(count):
     print((status("VmHWM:") - before) / 1024)
 
 
-def max_relative_error(count=300):
-    """Largest relative error on random pairs against mpmath's 50 digits."""
+def trial_pairs(count, nasty):
+    """Points (N, 3), both ends (N, 3) and cores (N,); nasty: a sixth each on the axis or its extension, on a node, next
+    to one, with next to no core, with next to no length, far away."""
+    rng = np.random.default_rng(3)
+    p, a, edge, away = rng.normal(size=(4, count, 3))
+    b, core = a + 0.3 * edge, 10 ** rng.uniform(-3, 0, count)
+    if not nasty:
+        return p, a, b, core
+    kind, along = np.arange(count) % 6, rng.uniform(-2, 3, (count, 1))
+    node = np.where(along > 0.5, a, b)
+    is_kind = lambda k: (kind == k)[:, None]  # noqa: E731
+    p = np.select([is_kind(0), is_kind(1), is_kind(2)], [a + along * (b - a), node, node + 1e-6 * away], p)
+    core = np.where(kind == 3, 10.0 ** -rng.integers(4, 300, count), core)
+    b = np.where(is_kind(4), a + 10.0 ** -rng.integers(3, 9, (count, 1)) * away, b)
+    return np.where(is_kind(5), p * 10.0 ** rng.integers(2, 6, (count, 1)), p), a, b, core
+
+
+def max_relative_error(count=1000):
+    """Largest error on `count` random and as many nasty pairs against mpmath's 50 digits.
+
+    Relative to what the segment induces at that distance when seen square on: on its axis the velocity itself is zero.
+    """
     import mpmath
 
-    rng = np.random.default_rng(3)
-    p, a, edge = rng.normal(size=(3, count, 3))
-    b, core = a + 0.3 * edge, 10 ** rng.uniform(-3, 0, count)
     one = lambda p, a, b, c: segment_velocity(p[None], a[None], b[None], jnp.ones(1), c[None])[0]  # noqa: E731
-    got = jax.jit(jax.vmap(one))(*map(jnp.asarray, (p, a, b, core)))
     worst = 0.0
-    with mpmath.workdps(50):
-        exact = lambda x: mpmath.matrix([mpmath.mpf(float(c)) for c in x])  # noqa: E731
-        for i in range(count):
-            r1, r2 = exact(p[i]) - exact(a[i]), exact(p[i]) - exact(b[i])
-            edge = r1 - r2
-            d1, d2, length = (mpmath.sqrt(sum(c * c for c in x)) for x in (r1, r2, edge))
-            c = [r1[k - 2] * r2[k - 1] - r1[k - 1] * r2[k - 2] for k in range(3)]
-            h2 = sum(x * x for x in c) / length**2
-            k = sum(edge[j] * (r1[j] / d1 - r2[j] / d2) for j in range(3))
-            v = [x * k / (4 * mpmath.pi * length**2 * (h2 + mpmath.mpf(core[i]) ** 2)) for x in c]
-            error = mpmath.sqrt(sum((x - mpmath.mpf(float(y))) ** 2 for x, y in zip(v, got[i], strict=True)))
-            worst = max(worst, float(error / mpmath.sqrt(sum(x * x for x in v))))
+    for nasty in (False, True):
+        pairs = trial_pairs(count, nasty)
+        got = np.asarray(jax.jit(jax.vmap(one))(*map(jnp.asarray, pairs)))
+        with mpmath.workdps(50):
+            for v, p, a, b, core in zip(got, *pairs, strict=True):
+                exact = lambda x: mpmath.matrix([mpmath.mpf(float(c)) for c in x])  # noqa: E731
+                r1, r2 = exact(p) - exact(a), exact(p) - exact(b)
+                edge = r1 - r2
+                d1, d2, length = (mpmath.sqrt(sum(c * c for c in x)) for x in (r1, r2, edge))
+                c = [r1[k - 2] * r2[k - 1] - r1[k - 1] * r2[k - 2] for k in range(3)]
+                spread = 4 * mpmath.pi * (sum(x * x for x in c) + (length * mpmath.mpf(float(core))) ** 2)
+                if 0 in (d1, d2, spread):
+                    worst = max(worst, float(np.abs(v).max()))
+                    continue
+                k = sum(edge[j] * (r1[j] / d1 - r2[j] / d2) for j in range(3)) / spread
+                error = mpmath.sqrt(sum((x * k - mpmath.mpf(float(y))) ** 2 for x, y in zip(c, v, strict=True)))
+                worst = max(worst, float(error / (k * length * d1)))
     return worst
 
 

@@ -1,5 +1,19 @@
-"""float64: the tests' own settings (the package never touches jax.config)."""
+"""The tests' own settings (the package never touches jax.config): float64, and one compilation cache for all processes.
+
+Most of the tests' time is compilation. The cache is shared by the workers, by the kernels that run the notebooks and by
+the commands that the tests start, which get it through the environment.
+"""
+
+import os
+from pathlib import Path
 
 import jax
 
+CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
+SHORTEST = 0.3  # seconds of compilation that are worth a file
+
 jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_compilation_cache_dir", CACHE)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", SHORTEST)
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", CACHE)
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST))

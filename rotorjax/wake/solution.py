@@ -14,11 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.frames import disk_points, rotate_about_shaft
-from rotorjax.rotor.blade_element import disk_loading, rotor_coefficients
+from rotorjax.rotor.blade_element import disk_loading
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, spread, transported
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
+from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, over_distant_ground
 
 
@@ -125,13 +126,7 @@ def _read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solutio
     found: Evaluation = evaluated(model, x)
     moved = transported(model, found)
     once_more = evaluated(model, moved)
-    stations, widths = model.stations, model.widths
-    now = rotor_coefficients(model.rotor, found.loads, stations, widths)
-    then = rotor_coefficients(model.rotor, once_more.loads, stations, widths)
-    inflow = -np.asarray(found.velocities.control[..., 2])
-    edges = np.asarray(model.edges)
-    area = np.diff(edges**2)
-    area[0] += edges[0] ** 2
+    now, then = performance(model, found), performance(model, once_more)
     tip = jnp.concatenate([found.start.points[:, :1], found.state.far[:, 0]], axis=1)
     psi = azimuths(found.state)
     settings = model.settings
@@ -145,17 +140,17 @@ def _read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solutio
         iterations=search.iterations,
         wall_time_s=0.0,
         compile_time_s=0.0,
-        r=np.asarray(stations),
-        widths=np.asarray(widths),
+        r=np.asarray(model.stations),
+        widths=np.asarray(model.widths),
         psi=np.asarray(psi),
         dct_dr=np.asarray(disk_loading(model.rotor, found.loads)),
-        inflow=inflow,
+        inflow=-np.asarray(found.velocities.control[..., 2]),
         circulation=np.asarray(found.loads.circulation),
         CT=float(now.thrust),
         CP=float(now.power),
         CP_induced=float(now.induced),
         CP_profile=float(now.profile),
-        mean_inflow=float(np.mean(inflow, axis=0) @ area),
+        mean_inflow=float(now.mean_inflow),
         tip_vortex=np.asarray(rotate_about_shaft(tip, psi[:, None])),
         tip_vortex_age=settings.age_step * (settings.near_ages + np.arange(settings.far_ages + 1)),
         residuals=tuple(search.residuals),

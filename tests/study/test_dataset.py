@@ -44,8 +44,10 @@ def test_rms_difference_of_a_constant_gap_is_the_gap():
 
 def test_axisymmetric_cases_are_repeated_and_their_vortices_turned(merged):
     level = merged.sel(case="h1")
-    np.testing.assert_array_equal(level["free_wake_inflow"], np.tile(level["free_wake_inflow"][0], (12, 1)))
-    np.testing.assert_allclose(level["tip_vortex"][3, 0, :2], [0.0, 1.0], atol=1e-12)
+    count = merged.sizes["azimuth"]
+    assert count > 1
+    np.testing.assert_array_equal(level["free_wake_inflow"], np.tile(level["free_wake_inflow"][0], (count, 1)))
+    np.testing.assert_allclose(level["tip_vortex"][count // 4, 0, :2], [0.0, 1.0], atol=1e-12)
     turned = _turned(np.array([[1.0, 0.0, -0.2]]), np.array([0.0, np.pi / 2]))
     np.testing.assert_allclose(turned[1], [[0.0, 1.0, -0.2]], atol=1e-15)
 

@@ -1,0 +1,29 @@
+"""What a rotor in its wake does: thrust, power and mean inflow."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.rotor.blade_element import rotor_coefficients
+from rotorjax.wake.equilibrium import Evaluation
+from rotorjax.wake.model import FreeWake
+
+
+class Performance(NamedTuple):
+    """thrust: C_T = T/(ρA(ΩR)²); power: C_P = P/(ρA(ΩR)³) = induced + profile; mean_inflow: over ΩR, area-weighted."""
+
+    thrust: Float[Array, ""]
+    power: Float[Array, ""]
+    induced: Float[Array, ""]
+    profile: Float[Array, ""]
+    mean_inflow: Float[Array, ""]
+
+
+def performance(model: FreeWake, found: Evaluation) -> Performance:
+    """Performance of the rotor in a wake, mean over its azimuths; the cut-out counts with the innermost inflow."""
+    inflow = -found.velocities.control[..., 2]
+    edges = model.edges
+    area = jnp.diff(edges**2).at[0].add(edges[0] ** 2)
+    mean = jnp.mean(inflow, axis=0) @ area
+    return Performance(*rotor_coefficients(model.rotor, found.loads, model.stations, model.widths), mean)
