@@ -26,8 +26,22 @@ def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> 
     return jax.lax.map(column, jnp.arange(example.size), batch_size=min(chunk, example.size)).T
 
 
-def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int, restart: int) -> Float[Array, " n"]:
+def _solve(
+    product: Callable, b: Float[Array, " n"], method: Method, chunk: int, restart: int, inverse: Array | None
+) -> Float[Array, " n"]:
     """Solve product(v) = b so that jax can differentiate and transpose it."""
+    if inverse is not None:
+        # refined once: a given inverse has lost the digits that the matrix's condition costs
+        def refined(matrix: Callable, v: Array, inverse: Array) -> Array:
+            first = inverse @ v
+            return first + inverse @ (v - matrix(first))
+
+        return jax.lax.custom_linear_solve(
+            product,
+            b,
+            solve=lambda matrix, v: refined(matrix, v, inverse),
+            transpose_solve=lambda matrix, v: refined(matrix, v, inverse.T),
+        )
     if method == "gmres":
         # Wrapped once more: jax's gmres alone starts from zeros_like(b), which transposition takes for an unknown.
         def solve(matrix: Callable, v: Array) -> Array:
@@ -48,7 +62,14 @@ def _solve(product: Callable, b: Float[Array, " n"], method: Method, chunk: int,
 
 @eqx.filter_jit
 def _tangent(
-    residual: Callable, solution: PyTree, args: tuple, args_dot: tuple, method: Method, chunk: int, restart: int
+    residual: Callable,
+    solution: PyTree,
+    args: tuple,
+    args_dot: tuple,
+    method: Method,
+    chunk: int,
+    restart: int,
+    inverse: Array | None = None,
 ) -> PyTree:
     """Solve F_x dx = −F_p dp at the solution."""
     flat, unravel = ravel_pytree(solution)
@@ -61,7 +82,7 @@ def _tangent(
 
     _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
     _, product = jax.linearize(of_state, flat)
-    return unravel(_solve(product, -push, method, chunk, restart))
+    return unravel(_solve(product, -push, method, chunk, restart, inverse))
 
 
 def attach(
@@ -71,6 +92,7 @@ def attach(
     method: Method = "dense",
     chunk: int = CHUNK,
     restart: int = 60,
+    inverse: Float[Array, "n n"] | None = None,
 ) -> PyTree:
     """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
 
@@ -79,7 +101,9 @@ def attach(
 
     method: "dense" makes and factorises the Jacobian once (`chunk` columns at a time) for all directions; "gmres"
     needs no matrix, at most 20 cycles of `restart` products, and gives NaN rather than a derivative that it could not
-    solve for. Derivatives flow through `args` only, not through arrays that `residual` closes over.
+    solve for. inverse: that of ∂F/∂x over the raveled solution where the caller has it, instead of either; it is
+    applied twice, so that it need not be exact to the last digits. Derivatives flow through `args` only, not through
+    arrays that `residual` closes over.
 
     Raises InputError where `method` is unknown.
     """
@@ -93,7 +117,7 @@ def attach(
     def rule(primals: tuple, tangents: tuple) -> tuple:
         # The value again, and not `solution`: second derivatives must see how it moves.
         x = value(*primals)
-        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart)
+        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, inverse)
 
     return value(jax.lax.stop_gradient(solution), traceable(args))
 
