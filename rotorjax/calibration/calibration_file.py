@@ -3,6 +3,7 @@
 [calibration]
 set = "hayden"             # or "freewake": which parameters there are and what they mean
 model_version = 1
+rotorjax = "0.1.0"
 converged = true
 rms_error = 0.00355
 [parameters]

@@ -1,8 +1,5 @@
 """Handing linear models over: python-control, MATLAB, NetCDF. Files appear whole or not at all."""
 
-import os
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +8,8 @@ import scipy.io
 import xarray as xr
 
 from rotorjax.errors import InputError
+from rotorjax.io import netcdf
+from rotorjax.io.atomic import whole_file
 from rotorjax.ode.models import LinearModel, PeriodicModel
 
 
@@ -30,28 +29,6 @@ def to_control(model: LinearModel) -> Any:
     return control.StateSpace(model.a, model.b, model.c, model.d, **names)
 
 
-def _replace(path: str | Path, write: Callable[[str], None]) -> Path:
-    """Write under a temporary name beside the target, then rename: a reader never sees half a file."""
-    target = Path(path)
-    if not target.parent.is_dir():
-        raise InputError(f"Argument `path` must lie in a folder that exists, but {target.parent} does not")
-    handle, temporary = tempfile.mkstemp(suffix=target.suffix, prefix=f".{target.stem}.", dir=target.parent)
-    os.close(handle)
-    try:
-        write(temporary)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, target)
-    finally:
-        Path(temporary).unlink(missing_ok=True)
-    return target
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
-
-
 def _fields(model: LinearModel | PeriodicModel) -> dict[str, np.ndarray]:
     return {key.upper(): getattr(model, key) for key in ("a", "b", "c", "d")}
 
@@ -59,7 +36,7 @@ def _fields(model: LinearModel | PeriodicModel) -> dict[str, np.ndarray]:
 def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
     """Write A, B, C, D (times along the third axis where periodic, as in MATLAB), names and units to a .mat file.
 
-    Raises InputError where the folder does not exist.
+    Raises InputError where the folder does not exist or cannot be written.
     """
     content: dict[str, Any] = _fields(model)
     if isinstance(model, PeriodicModel):
@@ -67,7 +44,9 @@ def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
         content |= {"t": model.t, "period": model.period, "x": model.x.T, "u": model.u, "y": model.y.T}
     for key in ("states", "inputs", "outputs", "input_units", "output_units"):
         content[key] = np.array(getattr(model, key), dtype=object)
-    return _replace(path, lambda name: scipy.io.savemat(name, content))
+    with whole_file(path) as temporary:
+        scipy.io.savemat(temporary, content)
+    return Path(path)
 
 
 def to_dataset(model: LinearModel | PeriodicModel) -> xr.Dataset:
@@ -100,6 +79,7 @@ def to_dataset(model: LinearModel | PeriodicModel) -> xr.Dataset:
 def save_netcdf(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
     """Write `to_dataset(model)` to a NetCDF file.
 
-    Raises InputError where the folder does not exist.
+    Raises InputError where the folder does not exist or cannot be written.
     """
-    return _replace(path, lambda name: to_dataset(model).to_netcdf(name, engine="h5netcdf"))
+    netcdf.write(path, to_dataset(model))
+    return Path(path)

@@ -171,6 +171,23 @@ def rows_at(time: Float[Array, "*N"], psi: Float[Array, " T"], rows: Float[Array
     return jax.vmap(lambda column: jnp.interp(time, psi, column), in_axes=1)(rows)
 
 
+def passage(
+    time: Float[Array, ""],
+    points: Float[Array, "*N 3"],
+    speed: Float[Array, ""],
+    chi: Float[Array, ""] | float,
+) -> tuple[Float[Array, "*N 3"], Float[Array, "*N 3"], Float[Array, "*N"]]:
+    """Return where (B) and when (t₀) the air at points below the disk passed the disk's plane, and the mirror points D.
+
+    A point above is its own B and D, passed now. Returns B, D, t₀; speed: over ΩR; chi: skew of the wake (rad).
+    """
+    x, y, z = jnp.moveaxis(points, -1, 0)
+    below = jnp.maximum(-z, 0.0)
+    foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.maximum(z, 0.0)], axis=-1)
+    mirror = jnp.stack([x, y, jnp.abs(z)], axis=-1)
+    return foot, mirror, time - below / (speed * jnp.cos(chi))
+
+
 @eqx.filter_jit
 def axial_velocity(
     time: Float[Array, ""],
@@ -191,12 +208,9 @@ def axial_velocity(
     states (`even_terms`) make it converge at any frequency.
     psi: instants of the window, which must hold t₀ … t; speed: convection speed of the wake, over ΩR.
     """
-    x, y, z = jnp.moveaxis(points, -1, 0)
-    below = jnp.maximum(-z, 0.0)
-    mirror = jnp.stack([x, y, jnp.abs(z)], axis=-1)
-    foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.zeros_like(z)], axis=-1)
+    z = points[..., 2]
+    foot, mirror, passed = passage(time, points, speed, chi)
     phi, disk = pressure_functions(model.modes, mirror), pressure_functions(model.modes, foot)
-    passed = time - below / (speed * jnp.cos(chi))
     wake = jnp.sum((rows_at(passed, psi, a) + rows_at(passed, psi, delta)) * disk, axis=0)
     wake = wake - jnp.tensordot(rows_at(time, psi, delta), phi, 1)
     return jnp.where(z >= 0, jnp.tensordot(rows_at(time, psi, a), phi, 1), wake)

@@ -13,7 +13,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import RotorInputs, costates, flow_matrices, rate_table, rows_at
+from rotorjax.potential.dynamics import RotorInputs, costates, flow_matrices, passage, rate_table, rows_at
 from rotorjax.potential.field import velocity_functions
 from rotorjax.potential.model import FiniteStateModel
 from rotorjax.potential.moving_ground import require_increasing
@@ -50,16 +50,12 @@ def velocity_at(
     Below the disk v_A(t) = v_B(t₀) ± (v_C†(t₀) − v_D†(t)), plus for the axial, minus for the in-plane components: the
     acceleration of a pressure mode is even along the axis and odd across it.
     """
-    x, y, z = jnp.moveaxis(points, -1, 0)
-    below = jnp.maximum(-z, 0.0)
-    foot = jnp.stack([x - below * jnp.tan(chi), y, jnp.maximum(z, 0.0)], axis=-1)
-    mirror = jnp.stack([x, y, jnp.abs(z)], axis=-1)
-    passed = time - below / (speed * jnp.cos(chi))
+    foot, mirror, passed = passage(time, points, speed, chi)
     at_foot, at_mirror = velocity_functions(model.modes, foot), velocity_functions(model.modes, mirror)
     flow = jnp.einsum("cmn,mn->nc", at_foot, rows_at(passed, psi, a))
     adjoint = jnp.einsum("cmn,mn->nc", at_foot, rows_at(passed, psi, delta))
     adjoint = adjoint - jnp.einsum("cmn,m->nc", at_mirror, rows_at(time, psi, delta))
-    return flow + jnp.where(z[:, None] < 0, adjoint * jnp.array([-1.0, -1.0, 1.0], points.dtype), 0.0)
+    return flow + jnp.where(points[:, 2:] < 0, adjoint * jnp.array([-1.0, -1.0, 1.0], points.dtype), 0.0)
 
 
 def flow_over_window(

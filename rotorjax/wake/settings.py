@@ -126,30 +126,62 @@ def wake_settings(
 
     Raises InputError where a count, an angle or a length is out of range.
     """
-    for name, value, least in (
-        ("panels", panels, 4),
-        ("closure_turns", closure_turns, 0),
-        ("azimuths", azimuths, 1),
-    ):
+    numbers = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, bound_core_chords)
+    numbers += (self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
+    settings = WakeSettings(
+        panels,
+        age_step_deg,
+        near_wake_deg,
+        free_turns,
+        closure_turns,
+        azimuths,
+        tuple(inboard),
+        roll_up,
+        *(jnp.asarray(v, float) for v in numbers),
+    )
+    _check_counts(settings)
+    _check_roll_up(settings)
+    check_number("release", release, 0.0, 1.0)
+    for name in _POSITIVE:
+        check_number(name, float(getattr(settings, name)), 0.0, open_=True)
+    for name in ("turbulence", "inboard_decay"):
+        check_number(name, float(getattr(settings, name)), 0.0)
+    return settings
+
+
+_POSITIVE = ("sharpness", "tip_core", "inboard_core", "near_core", "control_core", "bound_core_chords", "taper_turns")
+_POSITIVE += ("self_induction_core", "circulation_lag", "stall_chords")
+
+
+def _check_counts(settings: WakeSettings) -> None:
+    """Raise InputError where a number of panels, ages or turns does not work out."""
+    for name, least in (("panels", 4), ("closure_turns", 0), ("azimuths", 1)):
+        value = getattr(settings, name)
         if value < least or value != int(value):
             raise InputError(f"Argument `{name}` must be a whole number of at least {least}, but is {value}")
-    steps = 360 / age_step_deg if age_step_deg > 0 else 0.5
+    step = settings.age_step_deg
+    steps = 360 / step if step > 0 else 0.5
     if abs(steps - round(steps)) > 1e-9 or steps < 12:
         raise InputError(
-            f"Argument `age_step_deg` must divide 360 and be at most 30, but is {age_step_deg}: try 7.5, 10, 15 or 20"
+            f"Argument `age_step_deg` must divide 360 and be at most 30, but is {step}: try 7.5, 10, 15 or 20"
         )
-    for name, value in (("near_wake_deg", near_wake_deg), ("free_turns", free_turns * 360)):
-        ages = value / age_step_deg
+    for name, value in (("near_wake_deg", settings.near_wake_deg), ("free_turns", settings.free_turns * 360)):
+        ages = value / step
         if abs(ages - round(ages)) > 1e-9 or ages < 4:
             raise InputError(
-                f"Argument `{name}` must be a whole number of age steps ({age_step_deg} deg), at least four, "
+                f"Argument `{name}` must be a whole number of age steps ({step} deg), at least four, "
                 f"but is {ages:.3g} of them"
             )
-    if closure_turns and free_turns < 2:
+    if settings.closure_turns and settings.free_turns < 2:
         raise InputError(
             f"Argument `free_turns` must be at least 2 where closure_turns > 0 (it repeats the last turn), "
-            f"but is {free_turns}"
+            f"but is {settings.free_turns}"
         )
+
+
+def _check_roll_up(settings: WakeSettings) -> None:
+    """Raise InputError where the rule is unknown, or the inboard filaments do not fit it."""
+    inboard, roll_up = settings.inboard, settings.roll_up
     if roll_up not in get_args(RollUp):
         raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {roll_up!r}")
     if roll_up == "impulse" and len(inboard) != 1:
@@ -159,28 +191,6 @@ def wake_settings(
         )
     if any(not 0 < r < 1 for r in inboard) or list(inboard) != sorted(set(inboard)):
         raise InputError(f"Argument `inboard` must hold rising span stations between 0 and 1, but is {inboard}")
-    check_number("release", release, 0.0, 1.0)
-    positive = {"sharpness": sharpness, "tip_core": tip_core, "inboard_core": inboard_core, "near_core": near_core}
-    positive |= {"control_core": control_core, "bound_core_chords": bound_core_chords, "taper_turns": taper_turns}
-    positive |= {"self_induction_core": self_induction_core, "circulation_lag": circulation_lag}
-    positive |= {"stall_chords": stall_chords}
-    for name, value in positive.items():
-        check_number(name, value, 0.0, open_=True)
-    for name, value in (("turbulence", turbulence), ("inboard_decay", inboard_decay)):
-        check_number(name, value, 0.0)
-    arrays = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, bound_core_chords)
-    arrays += (self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
-    return WakeSettings(
-        panels,
-        age_step_deg,
-        near_wake_deg,
-        free_turns,
-        closure_turns,
-        azimuths,
-        tuple(inboard),
-        roll_up,
-        *(jnp.asarray(v, float) for v in arrays),
-    )
 
 
 def quick_settings(**overrides) -> WakeSettings:

@@ -301,7 +301,7 @@ RUNGS = [
         {k: ROTOR_INPUTS[k] for k in ("hover", "climb and wind", "τ = 0")},
     ),
     Rung(
-        ("dynamics.axial_velocity", "dynamics.rows_at"),
+        ("dynamics.axial_velocity", "dynamics.passage", "dynamics.rows_at"),
         axial,
         with_states({k: EVERYWHERE[k] for k in ("above", "axis above", "far", "below", "axis below", "disk edge")}),
     ),

@@ -80,5 +80,5 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_missing_folder(tmp_path):
-    with pytest.raises(InputError, match="folder that exists"):
+    with pytest.raises(InputError, match="folder must exist and be writable"):
         save_mat(LINEAR, tmp_path / "nowhere" / "m.mat")
