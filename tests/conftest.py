@@ -1,4 +1,6 @@
-"""The tests' own settings (the package never touches jax.config): float64, and one compilation cache for all processes.
+"""The tests' own settings: float64, one compilation cache for all processes, and programs let go file by file.
+
+The package itself never touches jax.config.
 
 Most of the tests' time is compilation. The cache is shared by the workers, by the kernels that run the notebooks and by
 the commands that the tests start, which get it through the environment.
@@ -8,6 +10,7 @@ import os
 from pathlib import Path
 
 import jax
+import pytest
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 SHORTEST = 0.3  # seconds of compilation that are worth a file
@@ -17,3 +20,14 @@ jax.config.update("jax_compilation_cache_dir", CACHE)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", SHORTEST)
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", CACHE)
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def let_programs_go():
+    """Forget compiled programs after each file.
+
+    Every program keeps a few memory mappings; a process that runs all files comes to the 65 530 that Linux allows, and
+    XLA aborts in the middle of a compilation.
+    """
+    yield
+    jax.clear_caches()

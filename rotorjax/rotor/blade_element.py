@@ -67,12 +67,15 @@ def section_loads(
     *,
     simple_sweep: bool = False,
     span_mean: Float[Array, "R R"] | None = None,
+    chord_downwash: Float[Array, "*n"] | float = 0.0,
 ) -> SectionLoads:
     """Loads of sections at r (over R) in the velocities u_T, u_P (over ΩR).
 
     collective: pitch without twist (rad), the operating point's by default; give θ₀ + θ₁c cos ψ + θ₁s sin ψ for cyclic
     pitch. span_mean: matrix that averages along the span (`span_averages`); then the last axis is the span and stall
-    follows the averaged angle. Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite
+    follows the averaged angle. chord_downwash: further downwash (over ΩR) that a section sees at three quarters of its
+    chord, where it decides the lift, and not at the quarter chord, where the force acts: α = θ − atan2(u_P + it, u_T),
+    while lift stays across the flow (u_T, u_P). Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite
     derivatives.
     """
     u_t, u_p, r = jnp.broadcast_arrays(u_tangential, u_perpendicular, r)
@@ -82,7 +85,7 @@ def section_loads(
     safe_t = jnp.where(still, 1.0, u_t)
     phi = jnp.arctan2(u_p, safe_t)
     speed = jnp.where(still, 0.0, jnp.sqrt(safe_t**2 + u_p**2))
-    alpha = pitch - phi
+    alpha = pitch - jnp.arctan2(u_p + chord_downwash, safe_t)
     mach = speed * operating.tip_mach(rotor.radius)
     entry = alpha if span_mean is None else alpha @ span_mean.T
     cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)

@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.rotor.blade_element import SectionLoads, section_loads, span_averages
 from rotorjax.wake.field import node_velocities
+from rotorjax.wake.lifting_surface import chord_downwash
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.segments import releases
 from rotorjax.wake.transport import AgeOperator, age_operator
@@ -30,8 +31,11 @@ def operators(model: FreeWake) -> tuple[AgeOperator, AgeOperator]:
     return age_operator(settings.near_ages, settings.age_step), age_operator(settings.far_ages, settings.age_step)
 
 
-def blade_loads(model: FreeWake, control: Float[Array, "K R 3"], inputs: WakeInputs) -> SectionLoads:
-    """Section loads (K, R) from the air's velocity at the control points, in the blades' frames."""
+def blade_loads(
+    model: FreeWake, control: Float[Array, "K R 3"], gamma_bound: Float[Array, "K R"], inputs: WakeInputs
+) -> SectionLoads:
+    """Section loads (K, R) from the air's velocity at the lifting line, in the blades' frames, and its circulation."""
+    behind = model.settings.control_chords * model.chords
     return section_loads(
         model.rotor,
         model.operating,
@@ -39,6 +43,7 @@ def blade_loads(model: FreeWake, control: Float[Array, "K R 3"], inputs: WakeInp
         model.stations - control[..., 1],
         -control[..., 2],
         collective=inputs.collective,
+        chord_downwash=gamma_bound @ chord_downwash(model.stations, model.edges, behind).T,
         span_mean=span_averages(model.stations, model.widths, model.settings.stall_chords * model.chords),
     )
 
@@ -51,7 +56,7 @@ def rhs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, mod
     v = node_velocities(model, state, psi)
     near, far = operators(model)
     start = jax.vmap(lambda s: releases(model, s))(state)
-    wanted = blade_loads(model, v.control, inputs).circulation
+    wanted = blade_loads(model, v.control, state.gamma_bound, inputs).circulation
     leading = jnp.broadcast_to(model.leading, (*state.near.shape[:2], 3))
     return WakeState(
         near=v.near - _drift(near, state.near, leading),

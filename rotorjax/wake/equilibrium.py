@@ -54,7 +54,8 @@ def evaluate(model: FreeWake, x: Unknowns) -> Evaluation:
     """Velocities and loads of a periodic wake."""
     state, start = full_state(model, x)
     velocities = node_velocities(model, state)
-    return Evaluation(state, velocities, blade_loads(model, velocities.control, inputs_of(model)), start)
+    loads = blade_loads(model, velocities.control, x.gamma_bound, inputs_of(model))
+    return Evaluation(state, velocities, loads, start)
 
 
 evaluated = eqx.filter_jit(evaluate)

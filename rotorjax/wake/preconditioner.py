@@ -60,14 +60,15 @@ def _jacobian(model: FreeWake, x: Unknowns, found: Evaluation, responses: Comple
     def to_unknowns(moved, v):
         """Disturbance [K, n] of the wake that is produced, from those of states [K, m] and velocities [K, N, 3]."""
         parts = jnp.split(v, of_nodes, axis=1)
+        change = jax.vmap(state_of)(moved)
         velocities = Velocities(*(p.reshape(a.shape) for p, a in zip(parts, here[1].velocities, strict=True)))
         loads = jax.jvp(
-            lambda control: blade_loads(model, control, inputs_of(model)),
-            (here[1].velocities.control,),
-            (velocities.control,),
+            lambda control, gamma: blade_loads(model, control, gamma, inputs_of(model)),
+            (here[1].velocities.control, here[1].state.gamma_bound),
+            (velocities.control, change.gamma_bound),
         )[1]
         start = jax.vmap(lambda t: jax.jvp(lambda s: releases(model, state_of(s)), (state,), (t,))[1])(moved)
-        change = Evaluation(jax.vmap(state_of)(moved), velocities, loads, start)
+        change = Evaluation(change, velocities, loads, start)
         return _rows(jax.jvp(lambda e: transported(model, e), (here[1],), (change,))[1])
 
     states = jax.vmap(to_state)(jnp.eye(one.size))

@@ -37,6 +37,8 @@ class WakeSettings(eqx.Module):
         near_core: core of the lattice in the velocity of wake nodes, about the distance a node travels over its
             neighbour's sheet; the blade's own control points see control_core instead, small against a panel, so
             that circulation falls to zero at the tip.
+        control_chords: distance behind the lifting line at which the blade reads its own downwash, in chords
+            (lifting_surface.py): 0.5 is the three-quarter-chord condition, 0 a plain lifting line.
         bound_core_chords: core of the bound vortex in the velocity of wake nodes, over the chord. A lifting line is
             singular where a blade has a chord; without it the passing tip vortex is thrown up and the hover branch
             folds at a climb of 0.01 ΩR.
@@ -66,6 +68,7 @@ class WakeSettings(eqx.Module):
     inboard_core: Float[Array, ""]
     near_core: Float[Array, ""]
     control_core: Float[Array, ""]
+    control_chords: Float[Array, ""]
     bound_core_chords: Float[Array, ""]
     self_induction_core: Float[Array, ""]
     inboard_decay: Float[Array, ""]
@@ -115,6 +118,7 @@ def wake_settings(
     inboard_core: float = 0.12,
     near_core: float = 0.03,
     control_core: float = 0.002,
+    control_chords: float = 0.5,
     bound_core_chords: float = 0.55,
     self_induction_core: float = 0.01,
     inboard_decay: float = 0.6,
@@ -126,8 +130,8 @@ def wake_settings(
 
     Raises InputError where a count, an angle or a length is out of range.
     """
-    numbers = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, bound_core_chords)
-    numbers += (self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
+    numbers = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, control_chords)
+    numbers += (bound_core_chords, self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
     settings = WakeSettings(
         panels,
         age_step_deg,
@@ -144,7 +148,7 @@ def wake_settings(
     check_number("release", release, 0.0, 1.0)
     for name in _POSITIVE:
         check_number(name, float(getattr(settings, name)), 0.0, open_=True)
-    for name in ("turbulence", "inboard_decay"):
+    for name in ("turbulence", "inboard_decay", "control_chords"):
         check_number(name, float(getattr(settings, name)), 0.0)
     return settings
 
