@@ -22,6 +22,12 @@ os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", CACHE)
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST))
 
 
+def pytest_collection_modifyitems(items):
+    """Files with slow tests first, README and notebooks before all: one that starts last is waited for alone."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (item.path.name not in ("test_readme.py", "test_notebooks.py"), item.path not in slow))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def let_programs_go():
     """Forget compiled programs after each file.

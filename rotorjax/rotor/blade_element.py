@@ -75,8 +75,8 @@ def section_loads(
     pitch. span_mean: matrix that averages along the span (`span_averages`); then the last axis is the span and stall
     follows the averaged angle. chord_downwash: further downwash (over ΩR) that a section sees at three quarters of its
     chord, where it decides the lift, and not at the quarter chord, where the force acts: α = θ − atan2(u_P + it, u_T),
-    while lift stays across the flow (u_T, u_P). Broadcasts; a section in still air (u_T = u_P = 0) carries no load and has finite
-    derivatives.
+    while lift stays across the flow (u_T, u_P). Broadcasts; a section in still air (u_T = u_P = 0) carries no load and
+    has finite derivatives.
     """
     u_t, u_p, r = jnp.broadcast_arrays(u_tangential, u_perpendicular, r)
     pitch = (operating.collective if collective is None else collective) + geometry.twist(rotor, r)

@@ -32,5 +32,6 @@ def periodic_wake(solution: Solution, model: FreeWake) -> Unknowns:
             f"Argument `solution` must be axisymmetric (level ground or none), but has {x.near.shape[0]} azimuths: "
             "over a slope use rotorjax.ode.implicit.attach(residual, x, model, method='gmres')"
         )
-    inverse = jnp.real(harmonic_inverse(solution.model, x, 1).inverse[0])
+    with jax.ensure_compile_time_eval():  # the solution is at hand: nothing of this belongs into the caller's program
+        inverse = jnp.real(harmonic_inverse(solution.model, x, 1).inverse[0])
     return attach(residual, jax.tree.map(jnp.asarray, x), model, inverse=inverse)

@@ -1,5 +1,7 @@
 """The three-quarter-chord condition against a vortex lattice that knows nothing of lifting lines."""
 
+import itertools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,7 +52,7 @@ def lattice_slope(aspect, planform, rows, panels=20):
         return (1 + x / np.hypot(x, h)) / h
 
     columns = []
-    for inner, outer in zip(edges[:-1], edges[1:], strict=True):
+    for inner, outer in itertools.pairwise(edges):
         for s in place[0]:
             a, b = (np.array([planform(aspect, e) * s, e]) for e in (inner, outer))
             columns.append((trailer(a) - trailer(b) + bound(a, b)) / (4 * np.pi))
@@ -61,7 +63,7 @@ def lattice_slope(aspect, planform, rows, panels=20):
 @pytest.mark.parametrize("aspect", [2.55, 6.0, 15.0])
 @pytest.mark.parametrize("planform", [elliptic, rectangular])
 def test_it_is_the_lattice_with_one_row(aspect, planform):
-    """Weissinger's method is a lattice of one row; at the elliptic tips the bound vortex of the lattice is not straight."""
+    """Weissinger's method is a lattice of one row (whose bound vortex is not quite straight at elliptic tips)."""
     np.testing.assert_allclose(line_slope(aspect, planform, 0.5, 20), lattice_slope(aspect, planform, 1), rtol=2e-4)
 
 
