@@ -2,12 +2,13 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax.rotor.blade_element import SectionLoads, section_loads, span_averages
-from rotorjax.wake.field import node_velocities
+from rotorjax.wake.field import Velocities, node_velocities
 from rotorjax.wake.lifting_surface import chord_downwash
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.segments import releases
@@ -15,14 +16,26 @@ from rotorjax.wake.transport import AgeOperator, age_operator
 
 
 class WakeInputs(NamedTuple):
-    """What drives the wake. collective: θ₀ (rad)."""
+    """What drives the wake. collective: θ₀ (rad). climb: velocity over ΩR, positive up. height: over R, None for none.
+
+    A rotor that moves over fixed ground has dheight/dψ = climb; the velocity of ground that moves itself is left out.
+    """
 
     collective: Float[Array, ""]
+    climb: Float[Array, ""]
+    height: Float[Array, ""] | None
 
 
 def inputs_of(model: FreeWake) -> WakeInputs:
-    """The operating point's own inputs."""
-    return WakeInputs(model.operating.collective)
+    """The model's own inputs."""
+    return WakeInputs(model.operating.collective, model.climb, None if model.ground is None else model.ground.height)
+
+
+def driven(model: FreeWake, inputs: WakeInputs) -> FreeWake:
+    """The model under other inputs. With the model's own it is the model."""
+    climb = inputs.climb * model.operating.tip_speed(model.rotor.radius)
+    model = eqx.tree_at(lambda m: (m.operating.collective, m.operating.climb), model, (inputs.collective, climb))
+    return model if inputs.height is None else eqx.tree_at(lambda m: m.ground.height, model, inputs.height)
 
 
 def operators(model: FreeWake) -> tuple[AgeOperator, AgeOperator]:
@@ -51,16 +64,21 @@ def blade_loads(
 def rhs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, model: FreeWake) -> WakeState:
     """Rate of change of the state per radian of azimuth, with slice 0 at azimuth psi.
 
-    state: K = B slices (all blades at this instant), or K = 1 where the wake is axisymmetric. inputs: collective (rad).
+    state: K = B slices (all blades at this instant), or K = 1 where the wake is axisymmetric.
     """
-    v = node_velocities(model, state, psi)
+    model = driven(model, inputs)
+    return rates(state, node_velocities(model, state, psi), inputs, model)
+
+
+def rates(state: WakeState, velocities: Velocities, inputs: WakeInputs, model: FreeWake) -> WakeState:
+    """Rate of change of the state in given velocities."""
     near, far = operators(model)
     start = jax.vmap(lambda s: releases(model, s))(state)
-    wanted = blade_loads(model, v.control, state.gamma_bound, inputs).circulation
+    wanted = blade_loads(model, velocities.control, state.gamma_bound, inputs).circulation
     leading = jnp.broadcast_to(model.leading, (*state.near.shape[:2], 3))
     return WakeState(
-        near=v.near - _drift(near, state.near, leading),
-        far=v.far - _drift(far, state.far, start.points),
+        near=velocities.near - _drift(near, state.near, leading),
+        far=velocities.far - _drift(far, state.far, start.points),
         gamma_near=-_age_slope(near, state.gamma_near, state.gamma_bound),
         gamma_far=-_age_slope(far, state.gamma_far, start.strength),
         gamma_bound=(wanted - state.gamma_bound) / model.settings.circulation_lag,
