@@ -2,6 +2,10 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rotorjax.study.cases import Case
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -13,6 +17,32 @@ def add_rotor(parser: argparse.ArgumentParser) -> None:
         metavar="DEG",
         help="collective pitch (the rotor file's: 18 for uh60)",
     )
+
+
+def add_place(parser: argparse.ArgumentParser) -> None:
+    """--height, --slope and --climb."""
+    parser.add_argument(
+        "--height", type=float, metavar="H", help="hub over ground, over R (none: out of ground effect)"
+    )
+    parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
+    parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
+
+
+def case_of(chosen: argparse.Namespace) -> "Case":
+    """The case that --height and --slope ask for. Raises InputError where there is none."""
+    from rotorjax.errors import InputError
+    from rotorjax.study.cases import Case
+
+    if chosen.height is None and chosen.slope:
+        raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {chosen.slope:g} deg")
+    case = Case(chosen.height, chosen.slope)
+    _ = case.ground
+    return case
+
+
+def names_of(text: str) -> tuple[str, ...]:
+    """Names given by commas, each once."""
+    return tuple(dict.fromkeys(n.strip() for n in text.split(",") if n.strip()))
 
 
 def add_harmonics(parser: argparse.ArgumentParser) -> None:

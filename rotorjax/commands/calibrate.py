@@ -4,6 +4,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from rotorjax.commands.arguments import names_of
+
 LOADINGS = ("elliptic", "uniform", "triangular")
 
 
@@ -42,7 +44,7 @@ def run_hayden(chosen: argparse.Namespace) -> int:
     heights = chosen.heights or hayden.HEIGHTS
     tau = None if chosen.cases is None else hayden_run.loads_of(find_cases(chosen.cases), heights)
     with _Bar("hayden") as bar:
-        result = hayden_run.run(heights, _names(chosen.parameters), chosen.loading, tau, bar.show)
+        result = hayden_run.run(heights, names_of(chosen.parameters), chosen.loading, tau, bar.show)
     print(hayden_run.report(result))
     hayden_run.write(result, chosen.out)
     print(f"written: {chosen.out / 'calibration.toml'}")
@@ -57,7 +59,7 @@ def run_freewake(chosen: argparse.Namespace) -> int:
     from rotorjax.io.atomic import make_folder
 
     make_folder(chosen.out)
-    names = PARAMETERS.names if chosen.parameters is None else _names(chosen.parameters)
+    names = PARAMETERS.names if chosen.parameters is None else names_of(chosen.parameters)
     merged = find_cases(chosen.cases)
     with _Bar("free wake") as bar:
         result = freewake_run.run(merged, names, chosen.held, progress=bar.show)
@@ -65,10 +67,6 @@ def run_freewake(chosen: argparse.Namespace) -> int:
     freewake_run.write(result, chosen.out)
     print(f"written: {chosen.out / 'calibration.toml'}")
     return 0 if result.fit.converged else 1
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(n.strip() for n in text.split(",") if n.strip()))
 
 
 class _Bar:

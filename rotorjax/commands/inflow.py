@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_place, add_rotor, case_of
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -15,11 +15,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         description="Solve one steady case and print thrust, power and inflow. Exit code 1 where it did not converge.",
     )
     add_rotor(parser)
-    parser.add_argument(
-        "--height", type=float, metavar="H", help="hub over ground, over R (none: out of ground effect)"
-    )
-    parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
-    parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
+    add_place(parser)
     parser.add_argument(
         "--model",
         choices=("vpbfsm", "freewake", "both"),
@@ -48,7 +44,7 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.study.single import check_case, single_case
     from rotorjax.study.single_output import check_picture, picture, table
 
-    case = _case(chosen)
+    case = case_of(chosen)
     settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick)
     check_case(case, settings)
     check_picture(chosen.plot)
@@ -75,14 +71,3 @@ def run(chosen: argparse.Namespace) -> int:
     if chosen.plot is not None:
         picture(data, reference, chosen.plot)
     return 0 if bool(data.get("converged", 1)) else 1
-
-
-def _case(chosen: argparse.Namespace):
-    from rotorjax.errors import InputError
-    from rotorjax.study.cases import Case
-
-    if chosen.height is None and chosen.slope:
-        raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {chosen.slope:g} deg")
-    case = Case(chosen.height, chosen.slope)
-    _ = case.ground
-    return case

@@ -1,0 +1,73 @@
+"""Steps of the inputs marched with the nonlinear wake: what a linear model has to reproduce."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from rotorjax.errors import InputError
+from rotorjax.linearisation.system import WakeOutputs, outputs
+from rotorjax.ode.trajectory import march
+from rotorjax.wake.dynamics import WakeInputs, inputs_of, rhs
+from rotorjax.wake.model import FreeWake, WakeState, slices
+from rotorjax.wake.solution import Solution
+
+STEPS = {"collective": float(np.deg2rad(0.2)), "climb": 0.001, "height": 0.01}
+"""Size of the step of each input: rad, ΩR, R."""
+
+
+class Response(NamedTuple):
+    """Deviation of the outputs after a step. psi (N,): azimuth since the step. outputs: fields (N, …)."""
+
+    psi: Float[np.ndarray, " N"]
+    outputs: WakeOutputs
+
+
+def nonlinear_step(
+    solution: Solution, name: str, size: float | None = None, *, turns: float = 1.0, samples: int = 24, steps: int = 8
+) -> Response:
+    """March the wake after a step of one input, by Runge-Kutta of fifth order, and give the outputs' deviations.
+
+    size: STEPS[name] by default. samples: in a turn; steps: between two samples. Over a slope all blades are marched
+    and the deviation is that from the undisturbed march.
+
+    Raises InputError where the input is unknown, or the march leaves the finite numbers (more `steps`).
+    """
+    model, u = solution.model, inputs_of(solution.model)
+    if getattr(u, name, None) is None:
+        raise InputError(f"Argument `name` must be an input of the model, but is {name!r}")
+    size = STEPS[name] if size is None else size
+    moved = u._replace(**{name: getattr(u, name) + size})
+    start = _instant(solution.state, model)
+    psi, after = _march(start, moved, model, turns, samples, steps)
+    before = _march(start, u, model, turns, samples, steps)[1] if slices(start) > 1 else None
+    at_rest = _outputs(psi[:1], jax.tree.map(lambda a: a[None], start), u, model)
+    rest = at_rest if before is None else _outputs(psi, before, u, model)
+    change = jax.tree.map(lambda a, b: np.asarray(a) - np.asarray(b), _outputs(psi, after, moved, model), rest)
+    return Response(psi, change)
+
+
+def _instant(state: WakeState, model: FreeWake) -> WakeState:
+    """State at ψ = 0: one slice where the wake is axisymmetric, otherwise those of the B blades."""
+    every = max(slices(state) // model.rotor.blades, 1)
+    return jax.tree.map(lambda a: jnp.asarray(a)[::every], state)
+
+
+def _march(
+    start: WakeState, u: WakeInputs, model: FreeWake, turns: float, samples: int, steps: int
+) -> tuple[np.ndarray, WakeState]:
+    count = round(turns * samples)
+    path = march(
+        rhs, start, 0.0, 2 * np.pi / (samples * steps), count * steps, u, model, save_every=steps, progress=False
+    )
+    if not path.finished:
+        raise InputError(f"Argument `steps` must be larger than {steps} for this wake: the march is {path.why}")
+    return np.asarray(path.t), path.x
+
+
+@eqx.filter_jit
+def _outputs(psi, states: WakeState, u: WakeInputs, model: FreeWake) -> WakeOutputs:
+    return jax.lax.map(lambda at: outputs(at[0], at[1], u, model), (jnp.asarray(psi), states))

@@ -1,0 +1,101 @@
+"""Small models for chosen inputs and outputs, and how far they are from the full one.
+
+A hovering wake has some tens of unstable modes (vortex pairing). Where the order asked for holds them all, they are
+kept and the rest is balanced: one small model, right in frequency and in time. A smaller order cannot hold them, and
+what is then best at steady frequencies is not what is best in time: on the imaginary axis an unstable mode looks like a
+response that came before its cause. So there are two small models: one balanced on iω, for Bode diagrams and loop
+shapes; one balanced on σ + iω with σ right of all modes (disturbances that grow with e^{σψ} and faster than the wake's
+own), for marching in time. Each is measured both ways.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from rotorjax.ode.models import LinearModel
+from rotorjax.ode.reduction import Reduced, balance, balance_in_band, bode_error_db, step_error
+
+HIGHEST = 2.0
+"""Highest frequency (1/rev) at which a reduced model is asked to be right."""
+TAILS = (0.1, 0.3, 0.03)
+GOOD_DB = 0.5
+RIGHT = 1.07
+"""σ over the growth of the fastest mode."""
+SPARE = 6
+"""States beside the unstable modes without which they are not worth keeping."""
+
+
+@dataclass(frozen=True)
+class Small:
+    """A reduced model. method: "balanced" (the bound holds), "on iω" or "on σ + iω". unstable: modes with Re λ ≥ 0.
+
+    bode_error_db, step_error (q, m): largest difference of magnitude up to HIGHEST; largest difference of a step over
+    a revolution, over its largest value.
+    """
+
+    reduced: Reduced
+    method: str
+    unstable: int
+    bode_error_db: Float[np.ndarray, "q m"]
+    step_error: Float[np.ndarray, "q m"]
+
+    @property
+    def model(self) -> LinearModel:
+        """The model itself."""
+        return self.reduced.model
+
+
+class Pair(NamedTuple):
+    """Reduced models for frequency responses and for marching in time (the same one where the order holds both).
+
+    unstable: modes of the full model with Re λ ≥ 0.
+    """
+
+    frequency: Small
+    time: Small
+    unstable: int
+
+
+def frequencies() -> Float[np.ndarray, " W"]:
+    """Where Bode errors are measured, 1/rev."""
+    return np.geomspace(0.01, HIGHEST, 80)
+
+
+def reduce(model: LinearModel, order: int) -> Pair:
+    """Reduce a model to at most `order` states.
+
+    Raises InputError where `order` is not between 1 and the model's.
+    """
+    growth = np.real(np.linalg.eigvals(model.a))
+    unstable = int(np.sum(growth >= 0))
+    if order > model.order or order >= unstable + (SPARE if unstable else 1):
+        both = _measured(model, balance(model, order), "balanced")
+        return Pair(both, both, unstable)
+    found: list[Small] = []
+    for tail in TAILS:
+        found.append(_measured(model, balance_in_band(model, order, HIGHEST, tail=tail), "on iω"))
+        if found[-1].bode_error_db.max() <= GOOD_DB:
+            break
+    frequency = min(found, key=lambda small: small.bode_error_db.max())
+    shift = RIGHT * float(growth.max())
+    grown = balance_in_band(_shifted(model, -shift), order, HIGHEST)
+    time = _measured(model, replace(grown, model=_shifted(grown.model, shift)), "on σ + iω")
+    return Pair(frequency, time, unstable)
+
+
+def _shifted(model: LinearModel, by: float) -> LinearModel:
+    """The model with all exponents moved to the right."""
+    return replace(model, a=model.a + by * np.eye(model.order))
+
+
+def _measured(full: LinearModel, reduced: Reduced, method: str) -> Small:
+    times = np.linspace(0, 2 * np.pi, 49)
+    return Small(
+        reduced,
+        method,
+        int(np.sum(np.real(reduced.model.poles()) >= 0)),
+        bode_error_db(full, reduced.model, frequencies()),
+        step_error(full, reduced.model, times),
+    )

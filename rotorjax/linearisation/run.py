@@ -1,0 +1,116 @@
+"""From a case to linear models: solve, linearise, find the spectrum, reduce, and march the same steps."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from rotorjax.errors import InputError
+from rotorjax.linearisation import figures
+from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step
+from rotorjax.linearisation.reduce import Pair, reduce
+from rotorjax.linearisation.system import check_names, linear_wake, order_of, residual_of
+from rotorjax.linearisation.waves import Spectrum, spectrum
+from rotorjax.ode.harmonic import average
+from rotorjax.ode.models import LinearModel, PeriodicModel
+from rotorjax.study.cases import Case
+from rotorjax.study.settings import StudySettings
+from rotorjax.wake import solution
+from rotorjax.wake.clock import Clock
+from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.search import Progress
+from rotorjax.wake.solution import Solution
+
+TOL = 1e-9
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Everything found about one case.
+
+    at_rest: relative rms of `dynamics.rhs` at the solution. periodic, full, small: the models. spectrum: None over a
+    slope. marched: nonlinear responses by input. march_error (q, m): largest difference between linear and nonlinear
+    step over a revolution, over the largest response. seconds: wall time by stage.
+    """
+
+    solution: Solution
+    at_rest: float
+    periodic: PeriodicModel
+    full: LinearModel
+    small: Pair
+    spectrum: Spectrum | None
+    marched: dict[str, Response]
+    march_error: Float[np.ndarray, "q m"]
+    seconds: dict[str, float]
+    compile_time_s: float
+
+
+def model_of(case: Case, settings: StudySettings) -> FreeWake:
+    """The free wake of a case."""
+    return free_wake(settings.rotor, settings.operating, case.ground, settings.wake)
+
+
+def check(model: FreeWake, inputs: tuple[str, ...], outputs: tuple[str, ...], order: int) -> None:
+    """Raise InputError for unknown names or an order that the model does not have, before anything is solved."""
+    check_names(model, inputs, outputs)
+    if not 1 <= order <= order_of(model):
+        raise InputError(f"Argument `order` must lie in [1, {order_of(model)}], the states of a blade, but is {order}")
+
+
+def linearise_case(
+    model: FreeWake,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    order: int,
+    progress: Progress | None = None,
+    *,
+    solver: Callable[..., Solution] | None = None,
+) -> Linearised | Solution:
+    """Solve and linearise a case; a solution that did not converge is returned as it is.
+
+    progress(stage, residual) is called as things go on. Raises InputError as `check` does.
+    """
+    check(model, inputs, outputs, order)
+    clock, stages = Clock(), _Stages(progress)
+    found = (solver or solution.solve)(model, None, progress, TOL)
+    stages.done("orbit")
+    if not found.converged:
+        return found
+    at_rest = residual_of(found)
+    periodic = linear_wake(found, inputs, outputs)
+    stages.done("linearisation")
+    full = average(periodic)
+    waves = spectrum(found) if found.psi.size == 1 else None
+    stages.done("spectrum")
+    small = reduce(full, order)
+    stages.done("reduction")
+    marched = {name: nonlinear_step(found, name) for name in full.inputs}
+    error = march_error(full, marched)
+    stages.done("marches")
+    return Linearised(found, at_rest, periodic, full, small, waves, marched, error, stages.seconds, clock.read()[1])
+
+
+def march_error(full: LinearModel, marched: dict[str, Response]) -> Float[np.ndarray, "q m"]:
+    """Largest difference between linear and marched steps (STEPS), over the largest marched response."""
+    error = np.empty((len(full.outputs), len(full.inputs)))
+    for m, name in enumerate(full.inputs):
+        truth = figures.values_of(marched[name], full.outputs)
+        ours = STEPS[name] * full.step(marched[name].psi)[:, :, m]
+        error[:, m] = np.abs(ours - truth).max(axis=0) / np.abs(truth).max(axis=0)
+    return error
+
+
+class _Stages:
+    """Wall time of each stage, shown as it ends."""
+
+    def __init__(self, progress: Progress | None):
+        self._progress, self._last = progress, time.perf_counter()
+        self.seconds: dict[str, float] = {}
+
+    def done(self, stage: str) -> None:
+        now = time.perf_counter()
+        self.seconds[stage], self._last = now - self._last, now
+        if self._progress is not None:
+            self._progress(f"{stage} done", 0.0)

@@ -1,0 +1,194 @@
+"""The free wake as a system with named inputs and outputs, linearised about its periodic state.
+
+Over level ground or none the state is constant in the blades' frames. Collective, climb and height move all blades
+alike and thrust, torque and mean inflow are means over the blades, so they meet axisymmetric disturbances only: one
+slice (K = 1) is the whole of that model, not an approximation.
+
+Over a slope the state changes with the azimuth and repeats from blade to blade, after 2π/B. Disturbances that are the
+same on all blades (`blades="alike"`) still make a model of one slice, the mean of the blades' rates; it leaves out that
+a slope turns them into disturbances that differ from blade to blade and back, which is of second order in the slope.
+`blades="all"` keeps every blade's own states.
+"""
+
+from typing import Literal, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ode.labels import labels, select
+from rotorjax.ode.linearise import linearise
+from rotorjax.ode.models import PeriodicModel
+from rotorjax.ode.orbit import Orbit, make_orbit
+from rotorjax.ode.outcome import Outcome, relative_rms
+from rotorjax.wake.dynamics import WakeInputs, blade_loads, driven, inputs_of, rhs
+from rotorjax.wake.equilibrium import Evaluation
+from rotorjax.wake.field import node_velocities
+from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
+from rotorjax.wake.performance import performance
+from rotorjax.wake.segments import releases
+from rotorjax.wake.solution import Solution
+
+Blades = Literal["alike", "all"]
+UNITS = {
+    "near": "R",
+    "far": "R",
+    "gamma_near": "ΩR²",
+    "gamma_far": "ΩR²",
+    "gamma_bound": "ΩR²",
+    "collective": "rad",
+    "climb": "ΩR",
+    "height": "R",
+    "lambda0": "ΩR",
+    "inflow": "ΩR",
+}
+NODES = 4
+"""Azimuths within a blade's passage at which the wake over a slope is linearised."""
+
+
+class WakeOutputs(NamedTuple):
+    """What is read off a wake, mean over the blades at one instant.
+
+    CT: T/(ρA(ΩR)²). CQ: Q/(ρA(ΩR)²R), equal to C_P. lambda0: area-mean inflow over ΩR, positive down, climb included.
+    inflow (R,): the same at each station.
+    """
+
+    CT: Float[Array, ""]
+    CQ: Float[Array, ""]
+    lambda0: Float[Array, ""]
+    inflow: Float[Array, " R"]
+
+
+def outputs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, model: FreeWake) -> WakeOutputs:
+    """Outputs of a state (K = 1 or B slices, as for `dynamics.rhs`), slice 0 at azimuth psi."""
+    model = driven(model, inputs)
+    velocities = node_velocities(model, state, psi)
+    start = jax.vmap(lambda s: releases(model, s))(state)
+    loads = blade_loads(model, velocities.control, state.gamma_bound, inputs)
+    found = performance(model, Evaluation(state, velocities, loads, start))
+    return WakeOutputs(found.thrust, found.power, found.mean_inflow, -jnp.mean(velocities.control[..., 2], axis=0))
+
+
+class Base(NamedTuple):
+    """Periodic wake (slices over one revolution) and its model."""
+
+    wake: WakeState
+    model: FreeWake
+
+    def at(self, psi: Float[Array, ""]) -> WakeState:
+        """Wakes of the B blades when blade 0 stands at psi, by trigonometric interpolation of the slices."""
+        blades, count = self.model.rotor.blades, slices(self.wake)
+        angle = psi + 2 * jnp.pi / blades * jnp.arange(blades)
+        # the highest harmonic of an even count is a cosine: its sine is zero at every slice
+        number = jnp.arange(count // 2 + 1)
+        weight = jnp.where((number == 0) | (2 * number == count), 1.0, 2.0) / count
+        wave = weight * jnp.exp(1j * number * angle[:, None])
+
+        def leaf(a: Array) -> Array:
+            return jnp.real(jnp.tensordot(wave, jnp.fft.rfft(a, axis=0), axes=1))
+
+        return jax.tree.map(leaf, self.wake)
+
+
+def _moved(t: Array, x: WakeState, base: Base) -> tuple[WakeState, WakeState]:
+    """State of all blades with the disturbance x (one slice for all, or B), and the base's own rate."""
+    state, rate = jax.jvp(base.at, (t,), (jnp.ones_like(t),))
+    return jax.tree.map(lambda a, d: a + d, state, x), rate
+
+
+def _disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeState:
+    """Rate of a disturbance of the wake over a slope: one slice for all blades alike, or B."""
+    state, own = _moved(t, x, base)
+    change = jax.tree.map(jnp.subtract, rhs(t, state, u, base.model), own)
+    return change if slices(x) > 1 else jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), change)
+
+
+def _disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeOutputs:
+    return outputs(t, _moved(t, x, base)[0], u, base.model)
+
+
+def residual_of(solution: Solution) -> float:
+    """Relative rms of `dynamics.rhs` at an axisymmetric solution: how far it is from rest. On a slope, of the mean
+    over the blades and the azimuths solved for.
+    """
+    model, state = solution.model, solution.state
+    u = inputs_of(model)
+    if slices(state) == 1:
+        rate = eqx.filter_jit(rhs)(jnp.zeros(()), state, u, model)
+        return relative_rms(_flat(rate), _flat(state))
+    base, zero = Base(state, model), jax.tree.map(lambda a: jnp.zeros((1, *a.shape[1:])), state)
+    times = np.asarray(azimuths(state))[: slices(state) // model.rotor.blades]
+    rates = [_flat(_disturbed_rhs(jnp.asarray(t), zero, u, base)) for t in times]
+    return relative_rms(np.concatenate(rates), _flat(state))
+
+
+def orbit_of(solution: Solution, blades: Blades = "alike") -> Orbit:
+    """The periodic wake as the orbit that is linearised about.
+
+    Axisymmetric: the constant state. Over a slope: disturbances from the solution, which are zero.
+    """
+    model, state = solution.model, solution.state
+    found = Outcome(
+        None,
+        solution.residual,
+        tuple(solution.residuals) or (solution.residual,),
+        solution.iterations,
+        solution.converged,
+        solution.why,
+        solution.wall_time_s,
+    )
+    if slices(state) == 1 and blades == "alike":
+        return make_orbit(0.0, jax.tree.map(lambda a: jnp.asarray(a)[None], state), 2 * np.pi, found)
+    count = 1 if blades == "alike" else model.rotor.blades
+    nodes = 1 if slices(state) == 1 else NODES
+    zero = jax.tree.map(lambda a: jnp.zeros((nodes, count, *a.shape[1:])), state)
+    return make_orbit(0.0, zero, 2 * np.pi / model.rotor.blades, found)
+
+
+def linear_wake(
+    solution: Solution,
+    inputs: tuple[str, ...] | None = None,
+    outputs_: tuple[str, ...] | None = None,
+    *,
+    blades: Blades = "alike",
+    chunk: int = 64,
+    progress: bool = False,
+) -> PeriodicModel:
+    """Linear model of a periodic wake, by `ode.linearise`: time is azimuth (rad), frequencies are per revolution.
+
+    inputs: of `WakeInputs` (collective, climb, height over ground); outputs_: of `WakeOutputs`. None takes all. One
+    time where the wake is axisymmetric, NODES of them in a passage 2π/B over a slope.
+
+    Raises InputError where the solution has not converged or a name is unknown.
+    """
+    orbit, u = orbit_of(solution, blades), inputs_of(solution.model)
+    chosen = {"inputs": inputs, "outputs": outputs_, "units": UNITS, "chunk": chunk, "progress": progress}
+    if slices(solution.state) == 1 and blades == "alike":
+        return linearise(rhs, outputs, orbit, u, solution.model, **chosen)
+    return linearise(_disturbed_rhs, _disturbed_outputs, orbit, u, Base(solution.state, solution.model), **chosen)
+
+
+def order_of(model: FreeWake) -> int:
+    """Number of states of one slice: the order of the linear model with all blades alike."""
+    settings, stations = model.settings, len(model.stations)
+    near, far = settings.near_ages, settings.filaments * settings.far_ages
+    return 3 * (stations + 1) * near + 3 * far + stations * near + far + stations
+
+
+def check_names(model: FreeWake, inputs: tuple[str, ...], outputs_: tuple[str, ...]) -> None:
+    """Raise InputError for an input or output that the model does not have, before anything is solved."""
+    inflow = jnp.zeros(len(model.stations))
+    for what, wanted, tree in (
+        ("inputs", inputs, inputs_of(model)),
+        ("outputs", outputs_, WakeOutputs(jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), inflow)),
+    ):
+        if not wanted:
+            raise InputError(f"Argument `{what}` must name at least one, but is empty")
+        select(labels(tree, what), wanted, what)
+
+
+def _flat(state: WakeState) -> np.ndarray:
+    return np.concatenate([np.asarray(leaf).ravel() for leaf in jax.tree.leaves(state)])
