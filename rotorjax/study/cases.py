@@ -45,9 +45,10 @@ class Case:
 def study_cases(heights: Iterable[float], slopes_deg: Iterable[float]) -> tuple[Case, ...]:
     """All cases of a study in solving order, each after the neighbour it starts from.
 
-    Out of ground effect; level ground from the highest down; slopes at h = 1 (which brings in the level case there)
-    from the gentlest up; the 30° slope at h = 1.5 and 0.9 where 30° is among the slopes. Raises InputError where a
-    height or a slope is not allowed, a height is at or below the rotor's clearance, or a slope is zero.
+    Out of ground effect, from which the highest starts; level ground from there down; slopes at h = 1 (which brings in
+    the level case there) from the gentlest up; the 30° slope at h = 1.5 and 0.9 where 30° is among the slopes. Raises
+    InputError where a height or a slope is not allowed, a height is at or below the rotor's clearance, or a slope is
+    zero.
     """
     heights, slopes = _numbers("heights", heights), _numbers("slopes", slopes_deg)
     if 0.0 in slopes:
@@ -62,11 +63,15 @@ def study_cases(heights: Iterable[float], slopes_deg: Iterable[float]) -> tuple[
 
 
 def neighbour(case: Case, solved: Sequence[Case]) -> Case | None:
-    """The solved case that `case` starts from: over ground the closest in slope, then in height; None where none is."""
+    """The solved case that `case` starts from; None where none is.
+
+    Over ground the closest in slope, then in height, or the one out of ground effect.
+    """
     if case.height is None:
         return None
     near = [other for other in solved if other.height is not None and other != case]
-    return min(near, key=lambda other: _distance(case, other), default=None)
+    distant = next((other for other in solved if other.height is None), None)
+    return min(near, key=lambda other: _distance(case, other), default=distant)
 
 
 def _distance(case: Case, other: Case) -> tuple[float, float]:

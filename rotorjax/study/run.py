@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from json import loads
 from pathlib import Path
+from threading import Thread
 from typing import Protocol
 
 import xarray as xr
@@ -18,7 +19,7 @@ from rotorjax.study.record import add_finite_state
 from rotorjax.study.schedule import Schedule
 from rotorjax.study.settings import StudySettings, differences
 from rotorjax.wake.model import FreeWake
-from rotorjax.wake.solution import Solution, solve
+from rotorjax.wake.solution import Solution, rehearse, solve
 
 Progress = Callable[[str, float], None]
 
@@ -72,9 +73,20 @@ def solve_cases(
                 bar.write(f"{case.label} did not converge: {data.attrs['why']}")
 
         schedule = Schedule(todo, lambda case: _needed(case, cases, found), work, keep)
+        if solver is solve and workers > 1 and todo and todo[0].height is None:
+            Thread(target=_rehearse, args=(todo, settings), daemon=True).start()
         done = found | schedule.run(workers)
     results = tuple(done[case] for case in cases)
     return StudyResult(results, tuple(c.label for c in cases if not bool(done[c]["converged"])))
+
+
+def _rehearse(todo: Sequence[Case], settings: StudySettings) -> None:
+    """Compile both models' programs for slopes, then for level ground, while the first case leaves a core idle."""
+    for tilted in (True, False):
+        of_kind = [case for case in todo if case.height is not None and bool(case.slope_deg) == tilted]
+        if of_kind:
+            solution = rehearse(wake_file.model_of(of_kind[0], settings))
+            add_finite_state(wake_file.to_dataset(of_kind[0], solution, settings), settings)
 
 
 def _needed(case: Case, cases: Sequence[Case], found: dict[Case, xr.Dataset]) -> Case | None:

@@ -14,15 +14,18 @@ from rotorjax.ode.continuation import Branch, continuation
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
-from rotorjax.wake.equilibrium import Unknowns, advance, residual
+from rotorjax.wake.equilibrium import Unknowns, residual
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.start import laid_level, prescribed, with_the_ground
 
 Progress = Callable[[str, float], None]
 
-STEEPER = np.deg2rad(7.5)
-"""Most that the ground tilts in the first step of a continuation."""
+STEEPER, GENTLER = np.deg2rad(7.5), np.deg2rad(1.0)
+"""Most that the ground tilts in the first step of a continuation, and the least step that is still tried."""
+
+SMALLEST = 0.05
+"""Least step of other continuations, over the whole way."""
 
 WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
@@ -44,7 +47,7 @@ class Search:
         """Wake of a model without ground, by way of the auxiliary flow."""
         washed = with_washout(model, WASHOUT)
         guess = prescribed(model, WASHOUT + 0.03)
-        first = anderson(_pass, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80)
+        first = anderson(residual, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80, difference=True)
         self.note("prescribed wake", first)
         if not np.isfinite(first.residual):
             self.ok, self.why = False, f"the prescribed wake diverged: {first.why}"
@@ -66,7 +69,8 @@ class Search:
             return eqx.tree_at(lambda m: m.ground.height, model, height)
 
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
-        return self.follow(between, x, stage, min(1.0, STEEPER / max(abs(tilt), 1e-9)))
+        first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
+        return self.follow(between, x, stage, first, last if tilt else SMALLEST)
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
@@ -75,7 +79,9 @@ class Search:
         self.ok, self.why = found.converged, found.why
         return model, found.x
 
-    def follow(self, at: Callable[[float], FreeWake], x: Unknowns, stage: str, first: float):
+    def follow(
+        self, at: Callable[[float], FreeWake], x: Unknowns, stage: str, first: float, smallest: float = SMALLEST
+    ):
         """Continuation over s from 0 to 1 with the model at(s)."""
 
         def step(guess, s, memory):
@@ -90,7 +96,7 @@ class Search:
 
         self.prepare(at(0.0), x)
         branch: Branch = continuation(
-            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=0.05, easy=5, jump=0.3, carry=carry
+            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=smallest, easy=5, jump=0.3, carry=carry
         )
         if not branch.outcomes:
             self.ok, self.why = False, branch.why
@@ -99,10 +105,10 @@ class Search:
         self.ok, self.why = branch.reached, branch.last.why if branch.reached else f"{stage}: {branch.why}"
         return at(reached), branch.last.x
 
-    def newton(self, model: FreeWake, x: Unknowns, tol: float) -> Outcome:
-        """Newton-Krylov at one model."""
-        linear = Krylov(forcing=0.03, precondition=self.inverse, restart=120, restarts=1)
-        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=10)
+    def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
+        """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
+        linear = Krylov(forcing=0.03, precondition=self.inverse, restart=effort, restarts=1)
+        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=10 if effort > 1 else 1)
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
@@ -137,7 +143,3 @@ def with_washout(model: FreeWake, washout: float) -> FreeWake:
 
 def _leaves(model: FreeWake) -> list:
     return jax.tree.leaves(eqx.filter(model, eqx.is_inexact_array))
-
-
-def _pass(x: Unknowns, model: FreeWake) -> Unknowns:
-    return advance(model, x)

@@ -21,6 +21,7 @@ from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, over_distant_ground
+from rotorjax.wake.start import prescribed
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,16 @@ def solve(
             x = jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), x)
         here, x = search.move(here, model, spread(x, slices), "to the case")
     return _read(here, x, search, clock)
+
+
+def rehearse(model: FreeWake) -> Solution:
+    """Compile what `solve` runs on a case of this kind, on a prescribed wake that solves nothing and is returned."""
+    slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
+    x = spread(prescribed(model), slices)
+    search = Search(tol=0.0, progress=None, ok=False, why="a rehearsal")
+    search.prepare(model, x)
+    search.newton(model, x, 0.0, effort=1)
+    return _read(model, x, search, Clock())
 
 
 def _fits(start: Solution, model: FreeWake) -> bool:

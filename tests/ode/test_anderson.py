@@ -93,3 +93,15 @@ def test_bad_start():
         anderson(jnp.cos, jnp.array([1]))
     with pytest.raises(InputError, match="shape"):
         anderson(lambda x: x[:1], jnp.zeros(2))
+
+
+def test_the_difference_itself_gives_the_same_iterates():
+    b = jnp.linspace(-1, 1, 40)
+
+    def difference(x, *args):
+        return {"x": affine(x, *args)["x"] - x["x"]}
+
+    one = anderson(affine, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10)
+    other = anderson(difference, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10, difference=True)
+    assert one.converged
+    np.testing.assert_allclose(one.residuals, other.residuals, rtol=1e-6, atol=1e-12)

@@ -24,7 +24,7 @@ def test_each_case_starts_from_its_neighbour():
     cases = study_cases(HEIGHTS, SLOPES_DEG)
     found = {case.name: neighbour(case, cases[:i]) for i, case in enumerate(cases)}
     assert found["oge"] is None
-    assert found["h3"] is None  # no ground yet to start from
+    assert found["h3"] == Case()  # no ground yet to start from
     assert found["h0.5"] == Case(0.75)
     assert found["h1-slope5"] == Case(1.0)
     assert found["h1-slope40"] == Case(1.0, 30.0)
