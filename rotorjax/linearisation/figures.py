@@ -44,7 +44,7 @@ def stability(spectrum: Spectrum) -> Figure:
     return figure
 
 
-def bode(full: LinearModel, reduced: LinearModel, highest: float, points: int = 160) -> Figure:
+def bode(full: LinearModel, reduced: LinearModel, highest: float, points: int = 100) -> Figure:
     """Magnitude and phase of every response, full against reduced, up to twice the frequency that was asked for."""
     frequencies = np.geomspace(0.01, 2 * highest, points)
     one, two = full.response(frequencies), reduced.response(frequencies)

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from rotorjax.errors import InputError
 from rotorjax.linearisation.system import WakeOutputs, outputs
+from rotorjax.ode.models import LinearModel
 from rotorjax.ode.trajectory import march
 from rotorjax.wake.dynamics import WakeInputs, inputs_of, rhs
 from rotorjax.wake.model import FreeWake, WakeState, slices
@@ -27,12 +28,12 @@ class Response(NamedTuple):
 
 
 def nonlinear_step(
-    solution: Solution, name: str, size: float | None = None, *, turns: float = 1.0, samples: int = 24, steps: int = 8
+    solution: Solution, name: str, size: float | None = None, *, turns: float = 1.0, samples: int = 24, steps: int = 16
 ) -> Response:
     """March the wake after a step of one input, by Runge-Kutta of fifth order, and give the outputs' deviations.
 
-    size: STEPS[name] by default. samples: in a turn; steps: between two samples. Over a slope all blades are marched
-    and the deviation is that from the undisturbed march.
+    size: STEPS[name] by default. samples: in a turn; steps: between two samples (`stable_steps`). Over a slope all
+    blades are marched and the deviation is that from the undisturbed march.
 
     Raises InputError where the input is unknown, or the march leaves the finite numbers (more `steps`).
     """
@@ -48,6 +49,14 @@ def nonlinear_step(
     rest = at_rest if before is None else _outputs(psi, before, u, model)
     change = jax.tree.map(lambda a, b: np.asarray(a) - np.asarray(b), _outputs(psi, after, moved, model), rest)
     return Response(psi, change)
+
+
+def stable_steps(model: LinearModel, samples: int = 24) -> int:
+    """Steps between two samples at which the march holds the model's fastest mode (the end of the blade is stiff).
+
+    The method is stable to |λ|Δψ = 3.3 on the negative real axis (`runge_kutta.RK5`); 2.5 is left of that.
+    """
+    return int(np.ceil(2 * np.pi / samples * np.abs(np.linalg.eigvals(model.a)).max() / 2.5))
 
 
 def _instant(state: WakeState, model: FreeWake) -> WakeState:

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.ode.models import LinearModel
-from rotorjax.ode.reduction import Reduced, balance, balance_in_band, bode_error_db, step_error
+from rotorjax.ode.reduction import Reduced, balance, balance_in_band, history_gap, magnitude_gap_db
 
 HIGHEST = 2.0
 """Highest frequency (1/rev) at which a reduced model is asked to be right."""
@@ -68,20 +68,21 @@ def reduce(model: LinearModel, order: int) -> Pair:
 
     Raises InputError where `order` is not between 1 and the model's.
     """
+    truth = _Truth(model)
     growth = np.real(np.linalg.eigvals(model.a))
     unstable = int(np.sum(growth >= 0))
     if order > model.order or order >= unstable + (SPARE if unstable else 1):
-        both = _measured(model, balance(model, order), "balanced")
+        both = truth.measure(balance(model, order), "balanced")
         return Pair(both, both, unstable)
     found: list[Small] = []
     for tail in TAILS:
-        found.append(_measured(model, balance_in_band(model, order, HIGHEST, tail=tail), "on iω"))
+        found.append(truth.measure(balance_in_band(model, order, HIGHEST, tail=tail), "on iω"))
         if found[-1].bode_error_db.max() <= GOOD_DB:
             break
     frequency = min(found, key=lambda small: small.bode_error_db.max())
     shift = RIGHT * float(growth.max())
     grown = balance_in_band(_shifted(model, -shift), order, HIGHEST)
-    time = _measured(model, replace(grown, model=_shifted(grown.model, shift)), "on σ + iω")
+    time = truth.measure(replace(grown, model=_shifted(grown.model, shift)), "on σ + iω")
     return Pair(frequency, time, unstable)
 
 
@@ -90,12 +91,20 @@ def _shifted(model: LinearModel, by: float) -> LinearModel:
     return replace(model, a=model.a + by * np.eye(model.order))
 
 
-def _measured(full: LinearModel, reduced: Reduced, method: str) -> Small:
-    times = np.linspace(0, 2 * np.pi, 49)
-    return Small(
-        reduced,
-        method,
-        int(np.sum(np.real(reduced.model.poles()) >= 0)),
-        bode_error_db(full, reduced.model, frequencies()),
-        step_error(full, reduced.model, times),
-    )
+class _Truth:
+    """Responses of the full model, made once."""
+
+    def __init__(self, full: LinearModel):
+        self._times = np.linspace(0, 2 * np.pi, 49)
+        self._response, self._step = full.response(frequencies()), full.step(self._times)
+
+    def measure(self, reduced: Reduced, method: str) -> Small:
+        """A reduced model with its errors."""
+        model = reduced.model
+        return Small(
+            reduced,
+            method,
+            int(np.sum(np.real(model.poles()) >= 0)),
+            magnitude_gap_db(self._response, model.response(frequencies())),
+            history_gap(self._step, model.step(self._times)),
+        )

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from rotorjax.errors import InputError
 from rotorjax.linearisation import figures
-from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step
+from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step, stable_steps
 from rotorjax.linearisation.reduce import Pair, reduce
 from rotorjax.linearisation.system import check_names, linear_wake, order_of, residual_of
 from rotorjax.linearisation.waves import Spectrum, spectrum
@@ -86,7 +86,8 @@ def linearise_case(
     stages.done("spectrum")
     small = reduce(full, order)
     stages.done("reduction")
-    marched = {name: nonlinear_step(found, name) for name in full.inputs}
+    steps = stable_steps(full)
+    marched = {name: nonlinear_step(found, name, steps=steps) for name in full.inputs}
     error = march_error(full, marched)
     stages.done("marches")
     return Linearised(found, at_rest, periodic, full, small, waves, marched, error, stages.seconds, clock.read()[1])

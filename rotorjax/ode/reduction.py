@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ode.models import LinearModel
@@ -183,7 +183,12 @@ def bode_error_db(
 
     A response below 1e-12 of the model's largest is rounding and counts as absent; absent in both is no difference.
     """
-    one, two = np.abs(full.response(frequencies)), np.abs(reduced.response(frequencies))
+    return magnitude_gap_db(full.response(frequencies), reduced.response(frequencies))
+
+
+def magnitude_gap_db(one: Complex[np.ndarray, "W q m"], two: Complex[np.ndarray, "W q m"]) -> Float[np.ndarray, "q m"]:
+    """`bode_error_db` of two frequency responses, the first being the reference."""
+    one, two = np.abs(one), np.abs(two)
     with np.errstate(divide="ignore", invalid="ignore"):
         gap = np.abs(20 * np.log10(two / one))
     absent = np.maximum(one, two) <= 1e-12 * one.max()
@@ -192,6 +197,10 @@ def bode_error_db(
 
 def step_error(full: LinearModel, reduced: LinearModel, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "q m"]:
     """Largest difference of each unit step response, over the largest value of the full one."""
-    one, two = full.step(times), reduced.step(times)
+    return history_gap(full.step(times), reduced.step(times))
+
+
+def history_gap(one: Float[np.ndarray, "N q m"], two: Float[np.ndarray, "N q m"]) -> Float[np.ndarray, "q m"]:
+    """Largest difference of each history, over the largest value of the first, the reference."""
     top = np.abs(one).max(axis=0)
     return np.abs(two - one).max(axis=0) / np.where(top > 0, top, 1.0)

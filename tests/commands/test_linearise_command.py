@@ -1,0 +1,82 @@
+"""`rotorjax linearise` end to end on a tiny wake; bad input."""
+
+import json
+from dataclasses import replace
+
+import matplotlib.image
+import numpy as np
+import pytest
+import scipy.io
+
+from rotorjax.cli import main
+from rotorjax.io import netcdf
+from rotorjax.wake import solution
+from rotorjax.wake.settings import wake_settings
+
+TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "free_turns": 2.0, "closure_turns": 2}
+
+
+@pytest.fixture(autouse=True)
+def tiny(monkeypatch):
+    monkeypatch.setattr("rotorjax.study.settings.quick_settings", lambda **more: wake_settings(**TINY | more))
+
+
+@pytest.mark.slow
+def test_it_writes_everything(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["linearise", "--quick", "--height", "1", "--order", "30", "--out", str(out)]) == 0
+    pictures = {f"{name}.{ending}" for name in ("bode", "steps", "stability") for ending in ("png", "pdf")}
+    files = {"full.nc", "full.mat", "reduced.nc", "reduced.mat", "linearise.json", "report.md"}
+    assert {path.name for path in out.iterdir()} == pictures | files
+    found = json.loads((out / "linearise.json").read_text())
+    assert found["orbit"]["converged"]
+    assert found["orbit"]["residual"] < 1e-8
+    assert found["orbit"]["rhs_residual"] < 1e-8
+    assert found["full_order"] == netcdf.read(out / "full.nc").sizes["state"]
+    assert found["reduced_order"] == scipy.io.loadmat(out / "reduced.mat")["A"].shape[0] <= 30
+    assert found["bode_error_db"]["CT"]["collective"] < 1
+    assert found["step_error"]["CT"]["collective"] < 0.05
+    modes = found["floquet_multipliers"]
+    assert modes[0]["magnitude"] == pytest.approx(np.exp(2 * np.pi * modes[0]["growth"]))
+    assert found["pairing"]["rate"]["smallest"] <= found["pairing"]["rate"]["median"]
+    assert matplotlib.image.imread(out / "bode.png").std() > 0.05
+    assert "CT per collective" in capsys.readouterr().out
+    assert "| CT (-) | collective (rad) |" in (out / "report.md").read_text()
+
+
+def test_a_wake_that_is_lost_gives_exit_code_1(tmp_path, monkeypatch, capsys):
+    from wakes import made_up
+
+    def lost(model, start, progress, tol):
+        return replace(made_up(model), converged=False, why="made up to fail")
+
+    monkeypatch.setattr(solution, "solve", lost)
+    assert main(["linearise", "--quick", "--out", str(tmp_path)]) == 1
+    assert "made up to fail" in capsys.readouterr().out
+    assert json.loads((tmp_path / "linearise.json").read_text())["orbit"]["converged"] is False
+
+
+BAD = {
+    "--inputs colective": "'colective'",
+    "--inputs height": "'height'",
+    "--inputs ,": "must name at least one",
+    "--outputs CX": "'CX'",
+    "--order 0": "but is 0",
+    "--order 100000": "but is 100000",
+    "--slope 5": "`height` must be given",
+    "--height 1 --climb 0.01": "`climb` must be 0 over ground",
+    "--order x": "invalid int value: 'x'",
+}
+
+
+@pytest.mark.parametrize("line", BAD)
+def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
+    try:
+        code = main(["linearise", "--quick", "--out", str(tmp_path), *line.split()])
+    except SystemExit as stop:
+        code = stop.code
+    printed = capsys.readouterr()
+    assert code == 2
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert BAD[line] in printed.err
