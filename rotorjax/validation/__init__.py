@@ -1,0 +1,1 @@
+"""Validation of the free wake against measurements and theory: `rotorjax validate`."""

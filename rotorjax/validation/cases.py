@@ -1,0 +1,30 @@
+"""All cases of the validation, in the order of the report."""
+
+from collections.abc import Sequence
+
+from rotorjax.errors import InputError
+from rotorjax.rotor.rotor_file import closest
+from rotorjax.validation import caradonna_tung, grid, ground, landgrebe, momentum, step
+from rotorjax.validation.case import Subject, ValidationCase
+
+CASES = {c.name: c for c in (caradonna_tung.CASE, momentum.CASE, landgrebe.CASE, ground.CASE, step.CASE, grid.CASE)}
+QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)
+
+
+def chosen_cases(names: Sequence[str] | None, subject: Subject) -> tuple[ValidationCase, ...]:
+    """The cases of these names, or those that suit the subject.
+
+    Raises InputError for an unknown name, a collective without a rotor, or the measured rotor's case with another one.
+    """
+    if subject.rotor is None and subject.collective_deg is not None:
+        raise InputError("Argument `collective` must come with a rotor, but `rotor` is not given")
+    for name in names or ():
+        if name not in CASES:
+            raise InputError(f"Argument `case` must name a case, but is '{name}': {closest(name, CASES)}")
+    if subject.rotor is not None and caradonna_tung.NAME in (names or ()):
+        raise InputError(
+            f"Argument `case` must not hold '{caradonna_tung.NAME}' with a rotor of one's own: "
+            "it is measured at 8 deg on its own rotor"
+        )
+    wanted = names or [n for n in (QUICK if subject.quick else CASES) if n != caradonna_tung.NAME or not subject.rotor]
+    return tuple(case for name, case in CASES.items() if name in wanted)

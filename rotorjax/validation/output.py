@@ -1,0 +1,56 @@
+"""What `rotorjax validate` leaves behind: pictures, validation.json and validation.md."""
+
+from pathlib import Path
+from typing import Any
+
+from rotorjax import __version__, plotting
+from rotorjax.io.atomic import write_json, write_text
+from rotorjax.validation.report import report
+from rotorjax.validation.run import Validation
+
+
+def write(found: Validation, folder: str | Path) -> None:
+    """Write every result into a folder that exists. Raises InputError where it cannot be written."""
+    folder = Path(folder)
+    for case, compared in zip(found.cases, found.comparisons, strict=True):
+        plotting.save(compared.draw(), folder / case.name)
+    write_json(folder / "validation.json", summary(found))
+    write_text(folder / "validation.md", report(found))
+
+
+def summary(found: Validation) -> dict[str, Any]:
+    """Content of validation.json."""
+    wakes = [
+        {
+            "rotor": p.rotor,
+            "collective_deg": p.collective_deg,
+            "height": p.height,
+            "changes": dict(p.changes),
+            "converged": s.converged,
+            "why": s.why,
+            "residual": s.residual,
+            "CT": s.CT,
+            "CP": s.CP,
+            "CP_induced": s.CP_induced,
+            "mean_inflow": s.mean_inflow,
+            "wall_time_s": s.wall_time_s,
+            "compile_time_s": s.compile_time_s,
+        }
+        for p, s in found.wakes.items()
+    ]
+    return {
+        "rotorjax": __version__,
+        "quick": found.subject.quick,
+        "settings": wake_settings_of(found),
+        "met": len(found.rows) - len(found.out),
+        "out": len(found.out),
+        "rows": [row.table() for row in found.rows],
+        "wakes": wakes,
+        "wall_time_s": found.wall_time_s,
+    }
+
+
+def wake_settings_of(found: Validation) -> dict[str, Any]:
+    """Settings of the wake that all cases share, by name."""
+    at = next(p for p in found.wakes if not p.changes)
+    return {k: v for k, v in at.settings(found.subject.quick).table().items() if k.startswith("wake.")}

@@ -1,0 +1,71 @@
+"""Wakes that cases ask for: each is solved once, from the nearest one before it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rotorjax.ground import plane
+from rotorjax.rotor import catalogue
+from rotorjax.study.settings import StudySettings, study_settings
+from rotorjax.wake.model import FreeWake, free_wake
+
+
+@dataclass(frozen=True)
+class Point:
+    """One wake in hover. rotor: name or file. collective_deg. height: over R, None out of ground effect.
+
+    changes: settings of the wake that differ from the default, as (name, value).
+    """
+
+    rotor: str
+    collective_deg: float
+    height: float | None = None
+    changes: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Name for readers."""
+        place = "OGE" if self.height is None else f"h = {self.height:g}"
+        more = "".join(f", {name} {value:g}" for name, value in self.changes)
+        return f"{self.rotor} {self.collective_deg:g}°, {place}{more}"
+
+    def settings(self, quick: bool) -> StudySettings:
+        """Rotor, operating point and settings of the wake. Raises InputError where one is not allowed."""
+        return study_settings(self.rotor, self.collective_deg, quick=quick, **dict(self.changes))
+
+    def model(self, quick: bool) -> FreeWake:
+        """The free wake to solve. Raises InputError where a setting is not allowed."""
+        settings = self.settings(quick)
+        ground = None if self.height is None else plane(self.height)
+        return free_wake(settings.rotor, settings.operating, ground, settings.wake)
+
+
+def point(rotor: str, collective_deg: float | None = None, height: float | None = None, **changes: Any) -> Point:
+    """Make a point; a collective of None is the rotor file's. Raises InputError for an unknown rotor."""
+    if collective_deg is None:
+        collective_deg = round(study_settings(rotor).collective_deg, 9)
+    return Point(rotor, collective_deg, height, tuple(sorted(changes.items())))
+
+
+def needed(task: Point, tasks: Sequence[Point]) -> Point | None:
+    """The wake that `task` starts from: among those before it with its rotor and settings, the nearest."""
+    before = [p for p in tasks[: tasks.index(task)] if p.rotor == task.rotor and p.changes == task.changes]
+    before = [p for p in before if p.height is None or (task.height is not None and p.height > task.height)]
+
+    def distance(p: Point) -> tuple[float, float]:
+        far = 10.0 if p.height is None and task.height is not None else abs((p.height or 0) - (task.height or 0))
+        return abs(p.collective_deg - task.collective_deg), far
+
+    return min(before, key=distance, default=None)
+
+
+def twist_of(rotor: str) -> float:
+    """Twist from axis to tip in degrees that a straight line through root cut-out and 0.9 R has (negative: washout)."""
+    import jax.numpy as jnp
+    import numpy as np
+
+    from rotorjax.rotor.geometry import twist
+
+    body, _ = catalogue.load(rotor)
+    r = np.linspace(float(body.root_cutout), 0.9, 50)
+    return float(np.rad2deg(np.polyfit(r, np.asarray(twist(body, jnp.asarray(r))), 1)[0]))

@@ -1,0 +1,92 @@
+"""What the cases read off a wake, and the order in which wakes are solved."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rotorjax.errors import InputError
+from rotorjax.validation import caradonna_tung, ground, momentum, step
+from rotorjax.validation.case import Subject
+from rotorjax.validation.cases import CASES, chosen_cases
+from rotorjax.validation.measure import clearance, far_pitch, section_lift, tip_path
+from rotorjax.validation.point import needed, point, twist_of
+from rotorjax.validation.reference import Path
+
+
+def test_the_tip_vortex_starts_on_the_blade_and_is_the_solutions_own(coarse_hover):
+    path = tip_path(coarse_hover)
+    assert path.r[0] == pytest.approx(float(coarse_hover.model.settings.release))
+    assert path.z[0] == 0
+    own = coarse_hover.tip_vortex[0]
+    far = np.searchsorted(path.age, coarse_hover.tip_vortex_age[0] - 1e-9)
+    np.testing.assert_allclose(path.age[far:], coarse_hover.tip_vortex_age, rtol=1e-12)
+    np.testing.assert_allclose(path.r[far:], np.hypot(own[:, 0], own[:, 1]), atol=1e-12)
+    np.testing.assert_allclose(path.z[far:], own[:, 2], atol=1e-12)
+
+
+def test_section_lift_is_the_solutions_loading(coarse_hover):
+    r = coarse_hover.r
+    chord = 0.1905 / 1.143
+    sigma = 2 * chord / np.pi
+    lift = section_lift(coarse_hover, r)
+    np.testing.assert_allclose(0.5 * sigma * lift * r**2, coarse_hover.dct_dr[0], rtol=0.05, atol=1e-4)
+
+
+def test_the_measured_rotors_rows(coarse_hover):
+    assert coarse_hover.converged
+    found = caradonna_tung.compare(Subject(), {caradonna_tung.AT: coarse_hover})
+    assert len(found.rows) == 18
+    for row in found.rows:  # coarse, so near and not within what is allowed
+        assert row.ours == pytest.approx(row.limits.reference, rel=0.4, abs=0.1)
+    exact = [replace(row, ours=row.limits.reference) for row in found.rows]
+    assert all(row.met for row in exact)
+    assert found.rows[0].limits.high == pytest.approx(1.03 * 0.00459)
+    assert len(found.draw().axes) == 3
+
+
+def test_a_straight_path_has_its_pitch():
+    age = np.linspace(0, 12, 200)
+    assert far_pitch(Path(age, np.ones(200), np.where(age < np.pi, 0, -0.07 * (age - np.pi))), 2) == pytest.approx(
+        -0.07
+    )
+
+
+def test_no_ground_is_infinitely_far(coarse_hover):
+    assert clearance(coarse_hover) == np.inf
+    assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
+
+
+def test_twist_is_a_line_through_the_table():
+    assert twist_of("caradonna_tung") == pytest.approx(0, abs=1e-9)
+    assert -20 < twist_of("uh60") < -12
+
+
+def test_time_to_63_percent_is_found_between_samples():
+    psi = np.linspace(0, 6, 61)
+    assert step.first_time(psi, 1 - np.exp(-psi / 1.5)) == pytest.approx(1.5 / (2 * np.pi), rel=1e-3)
+    assert np.isnan(step.first_time(psi, np.zeros(61)))
+    assert np.isnan(step.first_time(psi, np.full(61, np.nan)))
+
+
+def test_wakes_start_from_their_neighbours():
+    free, high, low = (point("uh60", 18.0, h) for h in (None, 2.0, 1.0))
+    other, finer = point("uh60", 16.0), point("uh60", 18.0, panels=28)
+    tasks = [free, other, finer, high, low]
+    assert [needed(task, tasks) for task in tasks] == [None, free, None, free, high]
+    assert point("uh60") == free
+
+
+def test_cases_that_suit_the_subject():
+    assert [c.name for c in chosen_cases(None, Subject())] == list(CASES)
+    assert "caradonna-tung" not in [c.name for c in chosen_cases(None, Subject("uh60", 15.0))]
+    assert [c.name for c in chosen_cases(None, Subject(quick=True))] == ["caradonna-tung", "momentum", "ground"]
+    assert [c.name for c in chosen_cases(["ground", "momentum"], Subject())] == ["momentum", "ground"]
+    assert momentum.points(Subject("elliott_althoff", 9.0)) == (point("elliott_althoff", 9.0),)
+    for names, subject, match in (
+        (["grond"], Subject(), "did you mean 'ground'"),
+        (None, Subject(None, 8.0), "must come with a rotor"),
+        (["caradonna-tung"], Subject("uh60"), "rotor of one's own"),
+    ):
+        with pytest.raises(InputError, match=match):
+            chosen_cases(names, subject)
