@@ -135,12 +135,13 @@ def ptera_kernel(args):
     try:
         from pterasoftware import _aerodynamics_functions as ptera
 
-        kernel = ptera.collapsed_velocities_from_line_vortices
+        kernel = ptera._collapsed_velocities_from_line_vortices  # of version 5; takes core radii as we do
     except (ImportError, AttributeError):
-        print("PteraSoftware is not installed (or without its line-vortex kernel): its row is skipped")
+        print("PteraSoftware 5 is not installed: its row is skipped")
         return None
-    points, start, end, strength, _ = (np.asarray(x, float) for x in as_segments(args))
-    return lambda: kernel(points, start, end, strength)
+    points, start, end, strength, core = (np.asarray(x, float) for x in as_segments(args))
+    met = np.zeros(4, np.int64)  # it counts the singular pairs it meets
+    return lambda: kernel(points, start, end, strength, core, met)
 
 
 def plain(points, start, end, strength, core):

@@ -23,9 +23,18 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST
 
 
 def pytest_collection_modifyitems(items):
-    """Files with slow tests first, README and notebooks before all: one that starts last is waited for alone."""
+    """Notebooks first, then other files with slow tests: one that starts last is waited for alone.
+
+    The README's study comes after them: a notebook has compiled the same programs by then.
+    """
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: (item.path.name not in ("test_readme.py", "test_notebooks.py"), item.path not in slow))
+    first = ("test_notebooks.py", "", "test_readme.py")
+
+    def order(item):
+        name = item.path.name
+        return first.index(name) if name in first else 1 if item.path in slow else len(first)
+
+    items.sort(key=order)
 
 
 @pytest.fixture(autouse=True, scope="module")
