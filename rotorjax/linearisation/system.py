@@ -106,6 +106,9 @@ def _disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeSta
     return change if slices(x) > 1 else jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), change)
 
 
+_compiled = eqx.filter_jit(_disturbed_rhs)
+
+
 def _disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeOutputs:
     return outputs(t, _moved(t, x, base)[0], u, base.model)
 
@@ -121,7 +124,7 @@ def residual_of(solution: Solution) -> float:
         return relative_rms(_flat(rate), _flat(state))
     base, zero = Base(state, model), jax.tree.map(lambda a: jnp.zeros((1, *a.shape[1:])), state)
     times = np.asarray(azimuths(state))[: slices(state) // model.rotor.blades]
-    rates = [_flat(_disturbed_rhs(jnp.asarray(t), zero, u, base)) for t in times]
+    rates = [_flat(_compiled(jnp.asarray(t), zero, u, base)) for t in times]
     return relative_rms(np.concatenate(rates), _flat(state))
 
 

@@ -182,6 +182,7 @@ def test_slices_are_interpolated_to_themselves_and_turn_from_blade_to_blade(wake
         np.testing.assert_allclose(later, jnp.roll(now, -1, axis=0), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_level_wake_taken_for_one_over_a_slope_has_the_same_model(wake, model):
     """The way of slopes (all blades, interpolated slices, disturbances alike) on a case whose answer is known."""
     slices = replace(wake, state=spread(jax.tree.map(jnp.asarray, wake.state), 8), psi=np.arange(8) * np.pi / 4)
