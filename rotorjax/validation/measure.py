@@ -1,11 +1,14 @@
 """What the cases read off a solved wake."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from rotorjax.frames import disk_points
 from rotorjax.validation.reference import Path
 from rotorjax.wake.equilibrium import evaluated
+from rotorjax.wake.field import velocity
 from rotorjax.wake.roll_up import at_span
 from rotorjax.wake.segments import lattice_nodes
 from rotorjax.wake.solution import Solution
@@ -36,6 +39,22 @@ def section_lift(solution: Solution, r: Float[np.ndarray, " N"]) -> Float[np.nda
     return np.interp(r, solution.r, np.asarray(loads.cl)[0])
 
 
+def disk_inflow(solution: Solution, azimuths: int = 48) -> float:
+    """Mean inflow over ΩR of an axisymmetric wake in hover, over the area and over all azimuths between two blades.
+
+    `Solution.mean_inflow` is the mean at the blades, where the inflow is larger than between them. azimuths: in a
+    blade's passage, equally spaced and none on a blade. The root cut-out counts with the innermost value.
+    """
+    model, count = solution.model, azimuths
+    psi = 2 * np.pi / model.rotor.blades * (np.arange(count) + 0.5) / count
+    r, edges = np.asarray(model.stations), np.asarray(model.edges)
+    points = disk_points(jnp.asarray(np.tile(r, count)), jnp.asarray(np.repeat(psi, r.size)))
+    inflow = -np.asarray(_velocity(solution.state, points, model))[0, :, 2].reshape(count, r.size)
+    area = np.diff(edges**2)
+    area[0] += edges[0] ** 2
+    return float(inflow.mean(axis=0) @ area)
+
+
 def clearance(solution: Solution) -> float:
     """Height over R of the lowest wake node above the ground; inf without ground."""
     ground = solution.model.ground
@@ -43,3 +62,6 @@ def clearance(solution: Solution) -> float:
         return float("inf")
     heights = [ground.distance(jnp.asarray(nodes)) for nodes in (solution.state.near, solution.state.far)]
     return float(min(jnp.min(h) for h in heights))
+
+
+_velocity = eqx.filter_jit(velocity)

@@ -9,7 +9,7 @@ from rotorjax.errors import InputError
 from rotorjax.validation import caradonna_tung, ground, momentum, step
 from rotorjax.validation.case import Subject
 from rotorjax.validation.cases import CASES, chosen_cases
-from rotorjax.validation.measure import clearance, far_pitch, section_lift, tip_path
+from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, section_lift, tip_path
 from rotorjax.validation.point import needed, point, twist_of
 from rotorjax.validation.reference import Path
 
@@ -55,6 +55,12 @@ def test_a_straight_path_has_its_pitch():
 def test_no_ground_is_infinitely_far(coarse_hover):
     assert clearance(coarse_hover) == np.inf
     assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
+
+
+def test_inflow_over_the_disk_is_less_than_at_the_blades_and_has_converged_in_azimuth(coarse_hover):
+    disk = disk_inflow(coarse_hover)
+    assert disk == pytest.approx(disk_inflow(coarse_hover, 24), rel=0.01)
+    assert 0.7 * coarse_hover.mean_inflow < disk < coarse_hover.mean_inflow
 
 
 def test_twist_is_a_line_through_the_table():
