@@ -39,8 +39,9 @@ def test_study_writes_everything_and_says_where(tmp_path, solver, capsys):
         "cases.nc",
         "cases",
         "fig06.png",
-        "fig12.pdf",
+        "fig12.png",
     }
+    assert not list(out.glob("*.pdf"))  # a first look needs none
     assert sorted(p.stem for p in (out / "cases").iterdir()) == ["h1", "h1-slope15", "h1.5", "h2", "oge"]
 
 
@@ -48,6 +49,7 @@ def test_a_diverged_case_gives_exit_code_1(tmp_path, solver, capsys):
     solver(fails_at((2.0, 0.0)))
     assert main(["study", "--out", str(tmp_path), "--heights", "2", "1", "--slopes"]) == 1
     assert "not converged: h = 2" in capsys.readouterr().out
+    assert (tmp_path / "fig06.pdf").exists()
     text = (tmp_path / "report.md").read_text()
     assert "**Not converged:** h2 (made up to fail)" in text
     summary = json.loads((tmp_path / "summary.json").read_text())

@@ -17,7 +17,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         "not converge.",
     )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
-    parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake")
+    parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake, no PDF")
     parser.add_argument("--heights", nargs="*", type=float, metavar="H", help="level heights over R")
     parser.add_argument("--slopes", nargs="*", type=float, metavar="DEG", help="slopes at h = 1, in degrees")
     add_rotor(parser)
@@ -38,7 +38,9 @@ def run(chosen: argparse.Namespace) -> int:
     cases = study_cases(heights, slopes)
     settings = study_settings(chosen.rotor, chosen.collective, harmonics=chosen.harmonics, quick=chosen.quick)
     result = solve_cases(cases, settings, chosen.out)
-    write_all(result.cases, settings, chosen.out, started)
+    # a PDF's fonts take longer than its picture, and a first look needs none
+    formats = ("png",) if chosen.quick else ("png", "pdf")
+    write_all(result.cases, settings, chosen.out, started, formats)
     print(f"{len(result.cases)} cases in {time.perf_counter() - started:.0f} s: {chosen.out / 'report.md'}")
     if result.diverged:
         print("not converged: " + ", ".join(result.diverged))

@@ -31,8 +31,10 @@ INFLOW = "inflow / mean OGE inflow of the free wake"
 Draw = Callable[[xr.Dataset], Figure | None]
 
 
-def draw_all(merged: xr.Dataset, folder: str | Path) -> tuple[list[str], list[str]]:
-    """Write every figure whose cases are there as PNG and PDF; return the names drawn and those left out.
+def draw_all(
+    merged: xr.Dataset, folder: str | Path, formats: Sequence[str] = ("png", "pdf")
+) -> tuple[list[str], list[str]]:
+    """Write every figure whose cases are there; return the names drawn and those left out.
 
     Raises InputError where the folder cannot be written.
     """
@@ -41,7 +43,7 @@ def draw_all(merged: xr.Dataset, folder: str | Path) -> tuple[list[str], list[st
         with style():
             figure = draw(merged)
         if figure is not None:
-            save(figure, Path(folder) / name)
+            save(figure, Path(folder) / name, formats)
         (missing if figure is None else drawn).append(name)
     return drawn, missing
 

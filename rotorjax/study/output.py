@@ -17,15 +17,22 @@ from rotorjax.study.settings import StudySettings
 from rotorjax.study.wake_file import case_of
 
 
-def write_all(cases: Sequence[xr.Dataset], settings: StudySettings, folder: str | Path, started: float) -> xr.Dataset:
+def write_all(
+    cases: Sequence[xr.Dataset],
+    settings: StudySettings,
+    folder: str | Path,
+    started: float,
+    formats: Sequence[str] = ("png", "pdf"),
+) -> xr.Dataset:
     """Write every result of a study into a folder and return the merged data set.
 
-    started: time.perf_counter() at the beginning of this run. Raises InputError where the folder cannot be written.
+    started: time.perf_counter() at the beginning of this run. formats: of the figures. Raises InputError where the
+    folder cannot be written.
     """
     folder = Path(folder)
     merged = combine(cases, settings)
     netcdf.write(folder / "cases.nc", merged)
-    drawn, missing = draw_all(merged, folder)
+    drawn, missing = draw_all(merged, folder, formats)
     wall = time.perf_counter() - started
     write_text(folder / "report.md", report(merged, drawn, missing, wall))
     write_json(folder / "summary.json", summary(cases, settings, wall))
