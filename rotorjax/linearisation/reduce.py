@@ -20,11 +20,10 @@ from rotorjax.ode.reduction import Reduced, balance, balance_in_band, history_ga
 HIGHEST = 2.0
 """Highest frequency (1/rev) at which a reduced model is asked to be right."""
 TAILS = (0.1, 0.3, 0.03)
-GOOD_DB = 0.5
+GOOD_DB, GOOD_STEP = 0.5, 0.03
+"""Bode error and step error at which no better model is looked for."""
 RIGHT = 1.07
 """σ over the growth of the fastest mode."""
-SPARE = 6
-"""States beside the unstable modes without which they are not worth keeping."""
 
 
 @dataclass(frozen=True)
@@ -71,18 +70,20 @@ def reduce(model: LinearModel, order: int) -> Pair:
     truth = _Truth(model)
     growth = np.real(np.linalg.eigvals(model.a))
     unstable = int(np.sum(growth >= 0))
-    if order > model.order or order >= unstable + (SPARE if unstable else 1):
-        both = truth.measure(balance(model, order), "balanced")
-        return Pair(both, both, unstable)
     found: list[Small] = []
+    if order > model.order or order > unstable:
+        found.append(truth.measure(balance(model, order), "balanced"))
+        if found[0].bode_error_db.max() <= GOOD_DB and found[0].step_error.max() <= GOOD_STEP:
+            return Pair(found[0], found[0], unstable)
+    shift = RIGHT * max(float(growth.max()), 0.0)
     for tail in TAILS:
         found.append(truth.measure(balance_in_band(model, order, HIGHEST, tail=tail), "on iω"))
-        if found[-1].bode_error_db.max() <= GOOD_DB:
+        grown = balance_in_band(_shifted(model, -shift), order, HIGHEST, tail=tail)
+        found.append(truth.measure(replace(grown, model=_shifted(grown.model, shift)), "on σ + iω"))
+        frequency = min(found, key=lambda small: small.bode_error_db.max())
+        time = min(found, key=lambda small: small.step_error.max())
+        if frequency.bode_error_db.max() <= GOOD_DB and time.step_error.max() <= GOOD_STEP:
             break
-    frequency = min(found, key=lambda small: small.bode_error_db.max())
-    shift = RIGHT * float(growth.max())
-    grown = balance_in_band(_shifted(model, -shift), order, HIGHEST)
-    time = truth.measure(replace(grown, model=_shifted(grown.model, shift)), "on σ + iω")
     return Pair(frequency, time, unstable)
 
 
