@@ -22,14 +22,13 @@ def write(found: Linearised, title: str, folder: str | Path) -> dict[str, Any]:
     Raises InputError where the folder cannot be written.
     """
     folder = Path(folder)
-    models = {"full": found.periodic, "reduced": found.small.frequency.model}
-    if found.small.time is not found.small.frequency:
-        models["reduced_time"] = found.small.time.model
+    small = found.small
+    models = {"full": found.periodic, "reduced_frequency": small.frequency.model, "reduced_time": small.time.model}
     for name, model in models.items():
         save_netcdf(model, folder / f"{name}.nc")
         save_mat(model, folder / f"{name}.mat")
-    plotting.save(figures.bode(found.full, found.small.frequency.model, HIGHEST), folder / "bode")
-    plotting.save(figures.steps(found.full, found.small.time.model, found.marched, STEPS), folder / "steps")
+    plotting.save(figures.bode(found.full, small.frequency.model, HIGHEST), folder / "bode")
+    plotting.save(figures.steps(found.full, small.time.model, found.marched, STEPS), folder / "steps")
     if found.spectrum is not None:
         plotting.save(figures.stability(found.spectrum), folder / "stability")
     content = summary(found)
@@ -152,11 +151,12 @@ def _models(found: Linearised, content: dict[str, Any]) -> str:
     )
     small_text = (
         f"Reduced model: {small.frequency.model.order} states, balanced with all unstable modes kept; error bound over "
-        f"all frequencies {small.frequency.reduced.bound:.2g} (reduced.nc, reduced.mat)."
+        f"all frequencies {small.frequency.reduced.bound:.2g}. It is right in frequency and in time, so that "
+        "reduced_frequency and reduced_time (.nc, .mat) hold the same."
         if small.time is small.frequency
         else f"{small.frequency.model.order} states cannot hold {small.unstable} unstable modes and a response beside "
-        "them, so there are two reduced models: one for steady frequencies (reduced.nc, reduced.mat), which must not "
-        "be marched in time, and one for marching (reduced_time.nc, reduced_time.mat), which is wrong at steady "
+        "them, so there are two reduced models: reduced_frequency (.nc, .mat) for steady frequencies, which must not "
+        "be marched in time, and reduced_time (.nc, .mat) for marching, which is wrong at steady "
         f"frequencies. `--order {small.unstable + 20}` or so gives one model that is right in both."
     )
     return (

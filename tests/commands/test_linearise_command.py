@@ -27,14 +27,14 @@ def test_it_writes_everything(tmp_path, capsys):
     names = ["--inputs", "collective,climb,height", "--outputs", "CT,CQ,lambda0"]
     assert main(["linearise", "--quick", "--height", "1", *names, "--order", "40", "--out", str(out)]) == 0
     pictures = {f"{name}.{ending}" for name in ("bode", "steps", "stability") for ending in ("png", "pdf")}
-    files = {"full.nc", "full.mat", "reduced.nc", "reduced.mat", "linearise.json", "report.md"}
-    assert {path.name for path in out.iterdir()} == pictures | files
+    models = {f"{name}.{end}" for name in ("full", "reduced_frequency", "reduced_time") for end in ("nc", "mat")}
+    assert {path.name for path in out.iterdir()} == pictures | models | {"linearise.json", "report.md"}
     found = json.loads((out / "linearise.json").read_text())
     assert found["orbit"]["converged"]
     assert found["orbit"]["residual"] < 1e-8
     assert found["orbit"]["rhs_residual"] < 1e-8
     assert found["full_order"] == netcdf.read(out / "full.nc").sizes["state"]
-    assert found["reduced_order"] == scipy.io.loadmat(out / "reduced.mat")["A"].shape[0] <= 40
+    assert found["reduced_order"] == scipy.io.loadmat(out / "reduced_frequency.mat")["A"].shape[0] <= 40
     assert found["bode_error_db"]["CT"]["collective"] < 1
     assert found["reduced_models"]["time"]["step_error"]["CT"]["collective"] < 0.05
     assert found["step_error"].keys() == {"CT", "CQ", "lambda0"}
