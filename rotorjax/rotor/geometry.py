@@ -34,8 +34,8 @@ class Hinge(eqx.Module):
     """Flap and lag data of an articulated blade, SI; all leaves are scalar arrays but the damper table.
 
     offset (m). blade_mass (kg). first_moment: ∫ r dm about the hinge (kg m). flap_inertia: about the hinge (kg m²).
-    delta3, precone (rad). damper_rate (m/s) and damper_force (N), [D]: the lag damper for positive rates (it is odd),
-    or None.
+    delta3, precone (rad). flap_spring, lag_spring (N m/rad). damper_rate (m/s) and damper_force (N), [D]: the lag
+    damper for positive rates (it is odd), or None; damper_arm (m): of its force about the lag hinge.
     """
 
     offset: Float[Array, ""]
@@ -44,6 +44,9 @@ class Hinge(eqx.Module):
     flap_inertia: Float[Array, ""]
     delta3: Float[Array, ""]
     precone: Float[Array, ""]
+    flap_spring: Float[Array, ""]
+    lag_spring: Float[Array, ""]
+    damper_arm: Float[Array, ""]
     damper_rate: Float[Array, " D"] | None
     damper_force: Float[Array, " D"] | None
 
@@ -51,7 +54,8 @@ class Hinge(eqx.Module):
 class Rotor(eqx.Module):
     """A rotor of equal blades.
 
-    name, blades: static. radius (m). root_cutout: where the aerofoil begins, over R. chord: (r/R, m). twist: (r/R,
+    name, blades: static. radius (m). root_cutout: where the aerofoil begins, over R. tip_loss: where the lift ends,
+    over R, for inflow models that do not lose it by themselves (the free wake does). chord: (r/R, m). twist: (r/R,
     rad), added to the collective. sweep: (r/R, rad), of the quarter-chord line, positive aft. airfoil: one table for
     the whole blade. hinge: flap and lag data, or None for a blade that neither flaps nor lags.
     """
@@ -60,6 +64,7 @@ class Rotor(eqx.Module):
     blades: int = eqx.field(static=True)
     radius: Float[Array, ""]
     root_cutout: Float[Array, ""]
+    tip_loss: Float[Array, ""]
     chord: Table
     twist: Table
     sweep: Table
@@ -111,17 +116,22 @@ def rotor(
     twist: Any = 0.0,
     sweep: Any = 0.0,
     hinge: Hinge | None = None,
+    tip_loss: float = 1.0,
 ) -> Rotor:
     """Make a rotor in SI units.
 
     `chord` (m), `twist` (rad) and `sweep` (rad) are a number or a pair (stations r/R, values). Raises InputError where
     blades is not a whole number of at least 1, the radius or a chord is not positive, root_cutout is not in [0, 0.95],
-    a sweep reaches ±80°, or a table has gaps, does not increase, does not cover root_cutout to 1 or leaves 0 to 1.
+    tip_loss not in (root_cutout, 1], the hinge lies beyond 0.5 R, a sweep reaches ±80°, or a table has gaps, does not
+    increase, does not cover root_cutout to 1 or leaves 0 to 1.
     """
     if isinstance(blades, bool) or not isinstance(blades, int) or blades < 1:
         raise refuse("blades", "be a whole number of at least 1", repr(blades))
     check_number("radius", radius, 0.0, open_=True)
     check_number("root_cutout", root_cutout, 0.0, 0.95)
+    check_number("tip_loss", tip_loss, float(root_cutout), 1.0, open_=True)
+    if hinge is not None:
+        check_number("hinge.offset", float(hinge.offset), 0.0, 0.5 * float(radius))
     tables = {
         key: _table(key, value, float(root_cutout), 1.0)
         for key, value in {"chord": chord, "twist": twist, "sweep": sweep}.items()
@@ -134,6 +144,7 @@ def rotor(
         blades=blades,
         radius=jnp.asarray(radius, float),
         root_cutout=jnp.asarray(root_cutout, float),
+        tip_loss=jnp.asarray(tip_loss, float),
         airfoil=airfoil,
         hinge=hinge,
         **tables,
@@ -147,20 +158,31 @@ def hinge(
     flap_inertia: float,
     delta3: float = 0.0,
     precone: float = 0.0,
+    flap_spring: float = 0.0,
+    lag_spring: float = 0.0,
+    damper_arm: float = 0.0,
     damper: Any = None,
 ) -> Hinge:
     """Make flap and lag data in SI units; `damper` is None or a pair (rates in m/s, forces in N), both from zero up.
 
-    Raises InputError where a value is not positive (offset: negative), or the damper's rates do not increase from zero.
+    Raises InputError where a mass or an inertia is not positive, an offset, a spring or the arm is negative, the flap
+    inertia is less than first_moment²/blade_mass, or the damper's rates do not increase from zero.
     """
     check_number("hinge.offset", offset, 0.0)
     positive = {"blade_mass": blade_mass, "first_moment": first_moment, "flap_inertia": flap_inertia}
     for name, value in positive.items():
         check_number(f"hinge.{name}", value, 0.0, open_=True)
+    positive = {"flap_spring": flap_spring, "lag_spring": lag_spring, "damper_arm": damper_arm}
+    for name, value in positive.items():
+        check_number(f"hinge.{name}", value, 0.0)
+    check_number("hinge.flap_inertia", flap_inertia, first_moment**2 / blade_mass)
     for name, value in {"delta3": delta3, "precone": precone}.items():
         check_number(f"hinge.{name}", value, -1.5, 1.5)
     rate, force = (None, None) if damper is None else check_stations("hinge.damper", *damper, first=0.0, last=0.0)
-    scalars = (offset, blade_mass, first_moment, flap_inertia, delta3, precone)
+    scalars = (
+        *(offset, blade_mass, first_moment, flap_inertia, delta3, precone),
+        *(flap_spring, lag_spring, damper_arm),
+    )
     return Hinge(
         *(jnp.asarray(value, float) for value in scalars),
         damper_rate=None if rate is None else jnp.asarray(rate),

@@ -24,6 +24,7 @@ _KEYS: dict[str, dict[str, tuple[bool, str]]] = {
         "blades": (True, "whole number"),
         "radius": (True, "number"),
         "root_cutout": (True, "number"),
+        "tip_loss": (False, "number"),
         "chord": (True, "table"),
         "twist_deg": (False, "table"),
         "sweep_deg": (False, "table"),
@@ -52,7 +53,10 @@ _KEYS: dict[str, dict[str, tuple[bool, str]]] = {
         "flap_inertia": (True, "number"),
         "delta3_deg": (False, "number"),
         "precone_deg": (False, "number"),
+        "flap_spring": (False, "number"),
+        "lag_spring": (False, "number"),
         "lag_damper_file": (False, "text"),
+        "lag_damper_arm": (False, "number"),
     },
 }
 _REQUIRED_TABLES = ("rotor", "airfoil", "operating")
@@ -96,6 +100,7 @@ def _build(data: dict[str, Any], folder: Path) -> tuple[geometry.Rotor, Operatin
         blades=body["blades"],
         radius=body["radius"],
         root_cutout=body["root_cutout"],
+        tip_loss=body.get("tip_loss", 1.0),
         chord=_stations("chord", body["chord"]),
         twist=_in_radians(_stations("twist_deg", body.get("twist_deg", 0.0))),
         sweep=_in_radians(_stations("sweep_deg", body.get("sweep_deg", 0.0))),
@@ -196,4 +201,6 @@ def _hinge(section: dict[str, Any], folder: Path) -> geometry.Hinge:
         if "lag_damper_file" in section
         else None
     )
-    return geometry.hinge(**numbers, **angles, damper=damper)
+    springs = {k: section[k] for k in ("flap_spring", "lag_spring") if k in section}
+    arm = section.get("lag_damper_arm", 0.0)
+    return geometry.hinge(**numbers, **angles, **springs, damper_arm=arm, damper=damper)
