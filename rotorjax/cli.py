@@ -2,8 +2,10 @@
 
 import argparse
 import os
+import platform
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from rotorjax import __version__
@@ -36,9 +38,7 @@ def parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code: 0, 1 where a case did not converge, 2 for bad input."""
     chosen = parser().parse_args(arguments)
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
+    _set_up_jax()
     try:
         return chosen.run(chosen)
     except InputError as error:
@@ -47,6 +47,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"\nrotorjax {chosen.command}: interrupted; finished cases are kept", file=sys.stderr)
         return INTERRUPTED
+
+
+def program_cache() -> Path:
+    """Folder of compiled programs, so that a command's second run need not compile: safe to delete at any time.
+
+    One for each machine, since programs are made for its processor and home folders are shared.
+    """
+    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(caches) / "rotorjax" / (platform.node() or "programs")
+
+
+def _set_up_jax() -> None:
+    """Double precision, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR or the caller says where."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    if jax.config.jax_compilation_cache_dir is None:
+        jax.config.update("jax_compilation_cache_dir", str(program_cache()))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 
 
 def script() -> NoReturn:

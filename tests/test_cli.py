@@ -158,3 +158,15 @@ def test_the_program_itself_needs_no_settings(tmp_path):
         [sys.executable, "-m", "rotorjax.cli", "--version"], capture_output=True, text=True, cwd=tmp_path, check=True
     )
     assert run.stdout.startswith("rotorjax 0.")
+
+
+def test_compiled_programs_are_kept_for_the_next_run(tmp_path):
+    """In the user's cache folder, unless JAX is told another."""
+    code = "import jax; from rotorjax import cli; cli._set_up_jax(); print(jax.config.jax_compilation_cache_dir)"
+
+    def folder(**more):
+        env = {key: value for key, value in os.environ.items() if not key.startswith("JAX_")} | more
+        return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
+
+    assert Path(folder(XDG_CACHE_HOME=str(tmp_path)).strip()).parent == tmp_path / "rotorjax"
+    assert folder(JAX_COMPILATION_CACHE_DIR="elsewhere").strip() == "elsewhere"
