@@ -1,8 +1,8 @@
 """The air's loads on blades that flap and lag on a moving hub: sections in their own unsteady relative velocity.
 
 Stations lie at r on the straight blade; on the moved one a section stands at e x̂ + (r − e) n (flap_lag.py). Its axes
-are n outboard, t = −∂n/∂ζ / cos β in the sense of rotation and k = ∂n/∂β up. The relative velocity along n is left out, as
-blade-element theory does.
+are n outboard, t = −∂n/∂ζ / cos β in the sense of rotation and k = ∂n/∂β up. The relative velocity along n is left
+out, as blade-element theory does.
 """
 
 from typing import NamedTuple

@@ -1,0 +1,168 @@
+"""The rotor and its inflow as one first-order system x' = rhs(t, x, u, p), x = (ψ, flap, lag, inflow).
+
+Time is Ω_ref t (rad) and everything is in rotor units (rotor/hub.py). Flap and lag are kept in multi-blade coordinates,
+as in Eq. 10, so that a steady flight is a steady state but for vibration, and repeats B times a revolution.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, PyTree
+
+from rotorjax.frames import rotate_about_shaft
+from rotorjax.inflow.interface import DiskLoads, InflowModel
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor import flap_lag, multiblade
+from rotorjax.rotor.flap_lag import Blade, blade_of
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.rotor.hub import RotorInputs, TurningFrame, pitch, turning_frame
+from rotorjax.rotor.moving_blade import AirLoads, Sections, air_loads, blade_sections, places
+
+
+class RotorState(eqx.Module):
+    """Flap and lag (rad) and their rates in multi-blade coordinates, each (B,): collective, cyclic, differential."""
+
+    flap: Float[Array, " B"]
+    flap_rate: Float[Array, " B"]
+    lag: Float[Array, " B"]
+    lag_rate: Float[Array, " B"]
+
+
+class CoupledState(eqx.Module):
+    """The state of Eq. 14. psi (): azimuth of blade 0 (rad). rotor: flap and lag. inflow: the inflow model's own."""
+
+    psi: Float[Array, ""]
+    rotor: RotorState
+    inflow: PyTree
+
+
+class CoupledRotor(eqx.Module):
+    """Parameters p: rotor, operating point, blade inertia and inflow model, all leaves differentiable.
+
+    panels: of a blade (static).
+    """
+
+    rotor: Rotor
+    operating: OperatingPoint
+    blade: Blade
+    inflow: InflowModel
+    panels: int = eqx.field(static=True, default=24)
+
+
+class Outputs(NamedTuple):
+    """What the rotor does at one instant; over ρA(ΩR)², its product with R for moments and with ΩR for power.
+
+    force, moment (3,): on the hub, hub frame (x aft, z up), inertia included. CT (): thrust of the air along the
+    shaft. CQ (): torque that turns the hub. CP_induced, CP_profile, CP_parasite, CP_damper (): power into the induced
+    velocity, into drag of the blades, into moving the hub through the air (a fuselage's drag, a climb) and into the lag
+    dampers; in periodic motion of a hub that does not turn their means add up to that of CQ. flap, lag (B,): of the
+    blades (rad). alpha (B, R): angles of attack. lift (B, R): along the shaft per length over ρΩ²R³.
+    """
+
+    force: Float[Array, "3"]
+    moment: Float[Array, "3"]
+    CT: Float[Array, ""]
+    CQ: Float[Array, ""]
+    CP_induced: Float[Array, ""]
+    CP_profile: Float[Array, ""]
+    CP_parasite: Float[Array, ""]
+    CP_damper: Float[Array, ""]
+    flap: Float[Array, " B"]
+    lag: Float[Array, " B"]
+    alpha: Float[Array, "B R"]
+    lift: Float[Array, "B R"]
+
+
+class _Evaluation(NamedTuple):
+    """Everything that rhs and output share; leading axis B but for state and loads."""
+
+    psi: Float[Array, " B"]
+    frames: TurningFrame
+    q: Float[Array, "B 2"]
+    q_dot: Float[Array, "B 2"]
+    q_dot_dot: Float[Array, "B 2"]
+    air: AirLoads
+    loads: DiskLoads
+
+
+def coupled_rotor(rotor: Rotor, operating: OperatingPoint, inflow: InflowModel, panels: int = 24) -> CoupledRotor:
+    """Couple a rotor with an inflow model. Raises InputError where the rotor has no hinge data."""
+    return CoupledRotor(rotor, operating, blade_of(rotor, operating), inflow, panels)
+
+
+def still_state(p: CoupledRotor, u: RotorInputs, thrust: float) -> CoupledState:
+    """A state to start from: blades at the precone, the inflow that suits a thrust coefficient."""
+    still = jnp.zeros(p.rotor.blades)
+    rotor = RotorState(still.at[0].set(p.blade.precone), still, still, still)
+    return CoupledState(jnp.zeros(()), rotor, p.inflow.start(jnp.asarray(thrust), u))
+
+
+def rhs(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> CoupledState:
+    """Rate of the state per radian of Ω_ref t; t itself does not enter."""
+    del t
+    found = _evaluate(x, u, p)
+    flap, lag = (
+        multiblade.accelerations(found.q_dot_dot[:, i], q, q_dot, x.psi, u.omega, u.omega_rate)
+        for i, (q, q_dot) in enumerate([(x.rotor.flap, x.rotor.flap_rate), (x.rotor.lag, x.rotor.lag_rate)])
+    )
+    rotor = RotorState(x.rotor.flap_rate, flap, x.rotor.lag_rate, lag)
+    return CoupledState(u.omega, rotor, p.inflow.rate(x.inflow, found.loads, u))
+
+
+def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> Outputs:
+    """Loads, power and blade motion at one instant."""
+    del t
+    found = _evaluate(x, u, p)
+    on_hub = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(
+        found.frames, found.q, found.q_dot, found.q_dot_dot, found.air.force, found.air.moment
+    )
+    force, moment, air_force = (
+        jnp.sum(rotate_about_shaft(v, found.psi), axis=0) / jnp.pi for v in (*on_hub, found.air.force)
+    )
+    lag_rate = found.q_dot[:, 1]
+    return Outputs(
+        force=force,
+        moment=moment,
+        CT=air_force[2],
+        CQ=-moment[2],
+        CP_induced=jnp.sum(found.air.induced) / jnp.pi,
+        CP_profile=jnp.sum(found.air.profile) / jnp.pi,
+        CP_parasite=air_force @ u.velocity,
+        CP_damper=jnp.sum(flap_lag.damper_moment(p.blade, lag_rate) * lag_rate) / (jnp.pi * p.blade.air),
+        flap=found.q[:, 0],
+        lag=found.q[:, 1],
+        alpha=found.air.loads.alpha,
+        lift=found.loads.lift,
+    )
+
+
+def sections_of(p: CoupledRotor) -> Sections:
+    """The blade's sections."""
+    return blade_sections(p.rotor, p.panels)
+
+
+def _evaluate(x: CoupledState, u: RotorInputs, p: CoupledRotor) -> _Evaluation:
+    sections = sections_of(p)
+    psi = multiblade.azimuths(x.psi, p.rotor.blades)
+    angles = [
+        multiblade.to_blades(q, q_dot, x.psi, u.omega)
+        for q, q_dot in ((x.rotor.flap, x.rotor.flap_rate), (x.rotor.lag, x.rotor.lag_rate))
+    ]
+    q, q_dot = (jnp.stack(pair, axis=-1) for pair in zip(*angles, strict=True))
+    frames = jax.vmap(lambda psi: turning_frame(u, psi, p.blade.gravity))(psi)
+    motion = jax.vmap(flap_lag.motion_of)(q, q_dot)
+    in_frame = jax.vmap(lambda m: places(p.blade, m, sections.r))(motion)
+    points = rotate_about_shaft(in_frame, psi[:, None])
+    induced = rotate_about_shaft(p.inflow.velocity(x.inflow, points, u), -psi[:, None])
+    theta = pitch(u, psi) - p.blade.coupling * (q[:, 0] - p.blade.precone)
+
+    def loads_of(frame, motion, theta, induced):
+        return air_loads(p.rotor, p.operating, p.blade, sections, frame, motion, theta, induced)
+
+    air = jax.vmap(loads_of)(frames, motion, theta, induced)
+    q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)
+    lift = air.per_length[..., 2]
+    loads = DiskLoads(lift, points, sections.widths, psi, sections.r, jnp.sum(air.force[:, 2]) / jnp.pi)
+    return _Evaluation(psi, frames, q, q_dot, q_dot_dot, air, loads)

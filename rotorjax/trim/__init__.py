@@ -1,0 +1,1 @@
+"""Trim: the controls and the periodic motion of a rotor in steady flight, found together."""

@@ -1,0 +1,158 @@
+"""Trim of a rotor in its free wake: wake, flapping and controls as one periodic problem.
+
+Unknowns are the periodic wake (K slices, wake/equilibrium.py), the flap angle of the blade at each slice and the three
+controls. Their residual joins that of the wake with the defect of the flap equation, taken through a well-damped linear
+flap equation so that it is an angle again, and with the trim equations. Blades do not lag. K = 1 is the axisymmetric
+hover, where cyclic pitch has nothing to do.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.frames import rotate_about_shaft
+from rotorjax.rotor import flap_lag
+from rotorjax.rotor.flap_lag import Blade
+from rotorjax.rotor.hub import RotorInputs, turning_frame
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluate, spread, transported
+from rotorjax.wake.field import carried
+from rotorjax.wake.model import Flight, FreeWake
+from rotorjax.wake.start import prescribed
+from rotorjax.wake.transport import harmonics
+
+DAMPING = 1.0
+"""Of the linear flap equation (per rad), about γ/8."""
+
+THRUST_STEP = 0.1
+"""Collective (rad) that a thrust equation is worth, wanted thrust against none: makes the residual an angle."""
+
+
+class InWake(NamedTuple):
+    """Unknowns. wake: K slices. flap (K,) rad. controls (3,): θ₀, θ₁c, θ₁s (rad)."""
+
+    wake: Unknowns
+    flap: Float[Array, " K"]
+    controls: Float[Array, "3"]
+
+
+class Loads(NamedTuple):
+    """Of each slice's blade. force (K, R, 3): per length over ρΩ²R³, in the frame of the slice. moment (K, 3): ∫ s f ds
+    about the flap hinge over ρΩ²R⁵. induced, profile (K,): power into the induced velocity and into drag, over ρΩ³R⁵.
+    """
+
+    force: Float[Array, "K R 3"]
+    moment: Float[Array, "K 3"]
+    induced: Float[Array, " K"]
+    profile: Float[Array, " K"]
+
+
+class WakeTrim(eqx.Module):
+    """Parameters: the free wake (its collective and flight are replaced), the blade's inertia, hub motion and C_T."""
+
+    model: FreeWake
+    blade: Blade
+    inputs: RotorInputs
+    thrust: Float[Array, ""]
+
+
+def flown(z: InWake, p: WakeTrim) -> FreeWake:
+    """The free wake's model with the motion and controls of z."""
+    slices = z.flap.shape[0]
+    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    theta_0, theta_1c, theta_1s = z.controls
+    cyclic = theta_1c * jnp.cos(psi) + theta_1s * jnp.sin(psi) - p.blade.coupling * (z.flap - p.blade.precone)
+    flight = Flight(-p.inputs.velocity, p.blade.offset, z.flap, _rate(z.flap), cyclic)
+    model = eqx.tree_at(lambda m: m.operating.collective, p.model, theta_0)
+    return eqx.tree_at(lambda m: m.flight, model, flight, is_leaf=lambda v: v is None)
+
+
+def residual(z: InWake, p: WakeTrim) -> InWake:
+    """How far one pass moves wake, flap and controls; zero in trim."""
+    model = flown(z, p)
+    found = evaluate(model, z.wake)
+    wake = jax.tree.map(lambda new, old: new - old, transported(model, found), z.wake)
+    loads = loads_of(model, found)
+    return InWake(wake, _flap_defect(z.flap, loads, p), _trim_defect(z, loads, p))
+
+
+def loads_of(model: FreeWake, found: Evaluation) -> Loads:
+    """Air loads of the blades in a wake."""
+    flight, loads = model.flight, found.loads
+    assert flight is not None
+    slices = flight.flap.shape[0]
+    flap = flight.flap[:, None]
+    zero = jnp.zeros_like(flap)
+    up = jnp.stack([-jnp.sin(flap), zero, jnp.cos(flap)], axis=-1)
+    ahead = jnp.array([0.0, 1.0, 0.0])
+    sine, cosine = jnp.sin(loads.inflow_angle)[..., None], jnp.cos(loads.inflow_angle)[..., None]
+    lift, drag = loads.dlift[..., None], loads.ddrag[..., None]
+    force = (lift * cosine - drag * sine) * up - (lift * sine + drag * cosine) * ahead
+    arm = model.stations - flight.hinge
+    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    own = found.velocities.control - jax.vmap(lambda angle: carried(model, angle))(psi)[:, None]
+    speed = loads.mach / model.operating.tip_mach(model.rotor.radius)
+    return Loads(
+        force,
+        jnp.einsum("r,krc->kc", model.widths * arm, force),
+        -jnp.einsum("r,krc,krc->k", model.widths, force, own),
+        jnp.einsum("r,kr,kr->k", model.widths, loads.ddrag, speed),
+    )
+
+
+def thrust_of(loads: Loads, p: WakeTrim) -> Float[Array, ""]:
+    """C_T along the shaft."""
+    return p.model.rotor.blades / jnp.pi * jnp.mean(loads.force[..., 2] @ p.model.widths)
+
+
+def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
+    """β₀, β₁c, β₁s."""
+    slices = flap.shape[0]
+    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    return jnp.stack([jnp.mean(flap), 2 * jnp.mean(flap * jnp.cos(psi)), 2 * jnp.mean(flap * jnp.sin(psi))])
+
+
+def _trim_defect(z: InWake, loads: Loads, p: WakeTrim) -> Float[Array, "3"]:
+    """Thrust wanted less thrust, as an angle; cyclic flapping, which cyclic pitch answers a quarter turn later."""
+    short = THRUST_STEP * (1 - thrust_of(loads, p) / p.thrust)
+    if z.flap.shape[0] == 1:
+        return jnp.stack([short, -z.controls[1], -z.controls[2]])
+    _, cosine, sine = harmonic(z.flap)
+    return jnp.stack([short, -sine, cosine])
+
+
+def _flap_defect(flap: Float[Array, " K"], loads: Loads, p: WakeTrim) -> Float[Array, " K"]:
+    """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap equation."""
+    slices = flap.shape[0]
+    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    frames = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity))(psi)
+    still = jnp.zeros_like(flap)
+    angles, rates = jnp.stack([flap, still], axis=-1), jnp.stack([_rate(flap), still], axis=-1)
+    wanted = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, angles, rates, loads.moment)[:, 0]
+    number = jnp.asarray(harmonics(slices))
+    left = jnp.fft.fft(wanted) + number**2 * jnp.fft.fft(flap)
+    frequency = flap_lag.flap_frequency(p.blade)
+    return jnp.fft.ifft(left / (frequency**2 - number**2 + 1j * DAMPING * number)).real
+
+
+def _rate(flap: Float[Array, " K"]) -> Float[Array, " K"]:
+    """∂β/∂ψ, exact for every harmonic that K slices hold."""
+    return jnp.fft.ifft(1j * jnp.asarray(harmonics(flap.shape[0])) * jnp.fft.fft(flap)).real
+
+
+def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices: int, inflow: float) -> InWake:
+    """A prescribed wake carried by the wind, blades that cone alone."""
+    wake = spread(prescribed(p.model, inflow), slices)
+    step = p.model.settings.age_step
+    psi = 2 * np.pi / slices * np.arange(slices)
+    wind = rotate_about_shaft(jnp.broadcast_to(-p.inputs.velocity, (slices, 3)), -jnp.asarray(psi))
+
+    def carry(nodes, first):
+        age = step * (first + jnp.arange(nodes.shape[2]))
+        return nodes + age[:, None] * wind[:, None, None, :]
+
+    moved = wake._replace(near=carry(wake.near, 1), far=carry(wake.far, p.model.settings.near_ages + 1))
+    return InWake(moved, jnp.full(slices, float(coning)), controls)

@@ -1,0 +1,134 @@
+"""Solving for trim: a first guess from momentum theory and blade elements, then Newton with the exact Jacobian."""
+
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.coupled import CoupledRotor, RotorState, sections_of
+from rotorjax.errors import InputError
+from rotorjax.inflow.momentum import hover_inflow
+from rotorjax.ode.implicit import attach
+from rotorjax.ode.newton import newton
+from rotorjax.ode.outcome import Outcome
+from rotorjax.rotor.checks import check_number
+from rotorjax.rotor.geometry import chord, solidity, twist
+from rotorjax.trim.problem import Controls, Flight, Trim, TrimResidual, inputs_at, outputs_at
+
+TOL = 1e-9  # largest equation left over: angles in rad, thrust over the wanted one
+AZIMUTHS = 24  # of a revolution
+
+
+@dataclass(frozen=True)
+class Trimmed:
+    """A trim, converged or not. z: unknowns. outcome: how Newton ended."""
+
+    z: Trim
+    outcome: Outcome
+    residual: TrimResidual
+
+
+def flight(
+    thrust: float,
+    advance: float = 0.0,
+    climb: float = 0.0,
+    tilt: float = 0.0,
+    drag_area: float = 0.0,
+    height: float | None = None,
+) -> Flight:
+    """Make a flight condition, tilt in rad, speeds over ΩR, drag_area over the disk's area, height over R.
+
+    Raises InputError where a value is not finite, thrust or height is not positive, advance not in [0, 0.5], the tilt
+    beyond ±0.7 rad or the disk would cut the ground.
+    """
+    check_number("thrust_coefficient", thrust, 0.0, open_=True)
+    check_number("advance_ratio", advance, 0.0, 0.5)
+    check_number("climb", climb, -0.05, 0.2)
+    check_number("tilt", tilt, -0.7, 0.7)
+    check_number("drag_area", drag_area, 0.0, 0.2)
+    if height is not None:
+        check_number("height", height, 0.0, open_=True)
+        if height <= abs(float(np.sin(tilt))):
+            raise InputError(
+                f"Argument `height` must exceed sin(tilt) = {abs(np.sin(tilt)):.3g}, where the disk cuts the ground, "
+                f"but is {height:g}"
+            )
+    scalars = (jnp.asarray(v, float) for v in (thrust, advance, climb, tilt, drag_area))
+    return Flight(*scalars, height=None if height is None else jnp.asarray(height, float))
+
+
+def most_thrust(p: CoupledRotor, advance: float) -> float:
+    """C_T that no inflow can exceed: every section at the greatest lift of its table, all round the disk."""
+    sections = sections_of(p)
+    most = float(jnp.max(p.rotor.airfoil.cl))
+    dynamic = 0.5 * chord(p.rotor, sections.r) * (sections.r**2 + advance**2 / 2)
+    return float(p.rotor.blades / jnp.pi * most * jnp.sum(dynamic * sections.widths * sections.lifting))
+
+
+def guess(p: CoupledRotor, flight: Flight, azimuths: int = AZIMUTHS) -> Trim:
+    """Uniform inflow and linear lift without stall: collective for the thrust, cyclic that keeps the disk level."""
+    blades, mu = p.rotor.blades, float(flight.advance)
+    thrust = float(flight.thrust)
+    start = Controls(jnp.zeros(()), jnp.zeros(()), jnp.zeros(()), flight.tilt)
+    u = inputs_at(start, flight)
+    inflow = float(hover_inflow(flight.thrust, u) + u.climb)
+    theta = 3 * (2 * thrust / (5.73 * float(solidity(p.rotor))) + inflow / 2) / (1 + 1.5 * mu**2)
+    blade = p.blade
+    stiffness = 1 + float(blade.offset * blade.first_moment + blade.flap_spring)
+    lift_moment = float(blade.air) * thrust * np.pi / blades * 0.72
+    coning = (lift_moment - float(blade.first_moment * blade.gravity)) / stiffness
+    controls = Controls(
+        jnp.asarray(theta - float(twist(p.rotor, jnp.asarray(0.75)))),
+        jnp.asarray(4 / 3 * mu * coning / (1 + mu**2 / 2)),
+        jnp.asarray(-mu * (8 / 3 * theta - 2 * inflow) / (1 + 1.5 * mu**2)),
+        flight.tilt,
+    )
+    nodes = -(-azimuths // blades)
+    still = jnp.zeros((nodes, blades))
+    rotor = RotorState(still.at[:, 0].set(coning), still, still, still)
+    state = p.inflow.start(flight.thrust, inputs_at(controls, flight))
+    return Trim(rotor, jax.tree.map(lambda v: jnp.broadcast_to(v, (nodes, *v.shape)), state), controls)
+
+
+def largest(f: np.ndarray, x: np.ndarray) -> float:
+    """Largest equation left over."""
+    del x
+    return float(np.max(np.abs(f))) if np.all(np.isfinite(f)) else float("inf")
+
+
+def trim(
+    p: CoupledRotor,
+    flight: Flight,
+    residual: TrimResidual | None = None,
+    start: Trim | None = None,
+    azimuths: int = AZIMUTHS,
+    progress: bool = False,
+) -> Trimmed:
+    """Trim a rotor. start: a trim nearby; residual: what is trimmed for, no cyclic flapping at a given tilt by default.
+
+    Raises InputError where the thrust is more than the blades can give at their greatest lift all round the disk.
+    """
+    residual = TrimResidual(p.rotor.blades) if residual is None else residual
+    most = most_thrust(p, float(flight.advance))
+    if float(flight.thrust) > most:
+        raise InputError(
+            f"Argument `thrust_coefficient` must be below {most:.4g}, where every section has its greatest lift, "
+            f"but is {float(flight.thrust):g}"
+        )
+    z = guess(p, flight, azimuths) if start is None else start
+    outcome = newton(residual, z, flight, p, tol=TOL, measure=largest, progress=progress)
+    return Trimmed(outcome.x, outcome, residual)
+
+
+@eqx.filter_jit
+def power(z: Trim, flight: Flight, p: CoupledRotor) -> Float[Array, ""]:
+    """Mean C_P = C_Q of a trim."""
+    return jnp.mean(outputs_at(z, flight, p).CQ)
+
+
+def trimmed_power(found: Trimmed, flight: Flight, p: CoupledRotor) -> Float[Array, ""]:
+    """C_P of a converged trim as a function of flight and rotor, differentiable by the implicit function theorem."""
+    return power(attach(found.residual, found.z, flight, p), flight, p)
