@@ -75,21 +75,22 @@ def steps(
 ) -> Figure:
     """Outputs after a step of each input: nonlinear march, full and reduced model."""
     shown: Sequence[str] = full.outputs[:MOST]
+    psi = marched[full.inputs[0]].psi
+    modelled = [model.step(psi) for model in (full, reduced)]
+    looks = (
+        {"color": FREE_WAKE, "label": f"full, {full.order} states"},
+        {"color": VPBFSM, "ls": "--", "label": f"reduced, {reduced.order} states"},
+    )
     with style():
         figure = new_figure(max(4.2 * len(full.inputs), 6.0), 2.6 * len(shown) + 0.6)
         axes = figure.subplots(len(shown), len(full.inputs), sharex=True, squeeze=False)
         for m, name in enumerate(full.inputs):
-            found = marched[name]
-            turns = found.psi / (2 * np.pi)
-            truth = values_of(found, full.outputs)
+            turns, truth = psi / (2 * np.pi), values_of(marched[name], full.outputs)
             for q, output in enumerate(shown):
                 axis = axes[q, m]
                 axis.plot(turns, truth[:, q], "o", color=INK, mfc="none", label="nonlinear march")
-                for model, look in (
-                    (full, {"color": FREE_WAKE, "label": f"full, {full.order} states"}),
-                    (reduced, {"color": VPBFSM, "ls": "--", "label": f"reduced, {reduced.order} states"}),
-                ):
-                    axis.plot(turns, sizes[name] * model.step(found.psi)[:, q, m], **look)
+                for step, look in zip(modelled, looks, strict=True):
+                    axis.plot(turns, sizes[name] * step[:, q, m], **look)
                 axis.set_ylabel(f"change of {_name(output)}")
             axes[0, m].set_title(f"step of {name}: {sizes[name]:.4g} {full.input_units[m]}")
             axes[-1, m].set_xlabel("revolutions after the step")

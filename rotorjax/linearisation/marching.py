@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.errors import InputError
-from rotorjax.linearisation.system import WakeOutputs, outputs
+from rotorjax.linearisation.assembly import velocities_along
+from rotorjax.linearisation.outputs import WakeOutputs, read
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.trajectory import march
-from rotorjax.wake.dynamics import WakeInputs, inputs_of, rhs
+from rotorjax.wake.dynamics import WakeInputs, driven, inputs_of, rhs
 from rotorjax.wake.model import FreeWake, WakeState, slices
 from rotorjax.wake.solution import Solution
 
@@ -56,7 +57,7 @@ def stable_steps(model: LinearModel, samples: int = 24) -> int:
 
     The method is stable to |λ|Δψ = 3.3 on the negative real axis (`runge_kutta.RK5`); 2.5 is left of that.
     """
-    return int(np.ceil(2 * np.pi / samples * np.abs(np.linalg.eigvals(model.a)).max() / 2.5))
+    return int(np.ceil(2 * np.pi / samples * np.abs(model.poles()).max() / 2.5))
 
 
 def _instant(state: WakeState, model: FreeWake) -> WakeState:
@@ -77,6 +78,15 @@ def _march(
     return np.asarray(path.t), path.x
 
 
-@eqx.filter_jit
-def _outputs(psi, states: WakeState, u: WakeInputs, model: FreeWake) -> WakeOutputs:
-    return jax.lax.map(lambda at: outputs(at[0], at[1], u, model), (jnp.asarray(psi), states))
+_read = eqx.filter_jit(lambda state, velocities, inputs, model: read(state, velocities, inputs, driven(model, inputs)))
+
+
+def _outputs(psi: np.ndarray, states: WakeState, u: WakeInputs, model: FreeWake) -> WakeOutputs:
+    """Outputs along a march, by the program that has made the velocities for the linear model too."""
+    still = jax.tree.map(jnp.zeros_like, u)
+
+    def at(k: int) -> WakeOutputs:
+        state = jax.tree.map(lambda a: a[k], states)
+        return _read(state, velocities_along(jnp.asarray(psi[k]), state, u, still, model)[0], u, model)
+
+    return jax.tree.map(lambda *rows: np.stack([np.asarray(row) for row in rows]), *map(at, range(len(psi))))

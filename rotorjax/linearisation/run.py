@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from rotorjax.errors import InputError
 from rotorjax.linearisation import figures
+from rotorjax.linearisation.assembly import assemble
 from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step, stable_steps
 from rotorjax.linearisation.reduce import Pair, reduce
 from rotorjax.linearisation.system import check_names, linear_wake, order_of, residual_of
@@ -78,11 +79,12 @@ def linearise_case(
     stages.done("orbit")
     if not found.converged:
         return found
-    at_rest = residual_of(found)
-    periodic = linear_wake(found, inputs, outputs)
+    parts = assemble(found) if found.psi.size == 1 else None
+    at_rest = residual_of(found, parts)
+    periodic = linear_wake(found, inputs, outputs, parts=parts)
     stages.done("linearisation")
     full = average(periodic)
-    waves = spectrum(found) if found.psi.size == 1 else None
+    waves = None if parts is None else spectrum(found, parts=parts)
     stages.done("spectrum")
     small = reduce(full, order)
     stages.done("reduction")
@@ -96,9 +98,10 @@ def linearise_case(
 def march_error(full: LinearModel, marched: dict[str, Response]) -> Float[np.ndarray, "q m"]:
     """Largest difference between linear and marched steps (STEPS), over the largest marched response."""
     error = np.empty((len(full.outputs), len(full.inputs)))
+    step = full.step(marched[full.inputs[0]].psi)
     for m, name in enumerate(full.inputs):
         truth = figures.values_of(marched[name], full.outputs)
-        ours = STEPS[name] * full.step(marched[name].psi)[:, :, m]
+        ours = STEPS[name] * step[:, :, m]
         error[:, m] = np.abs(ours - truth).max(axis=0) / np.abs(truth).max(axis=0)
     return error
 

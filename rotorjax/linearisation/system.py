@@ -19,17 +19,15 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
+from rotorjax.linearisation.assembly import Assembly, assemble
+from rotorjax.linearisation.outputs import WakeOutputs, outputs
 from rotorjax.ode.labels import labels, select
 from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import Orbit, make_orbit
 from rotorjax.ode.outcome import Outcome, relative_rms
-from rotorjax.wake.dynamics import WakeInputs, blade_loads, driven, inputs_of, rhs
-from rotorjax.wake.equilibrium import Evaluation
-from rotorjax.wake.field import node_velocities
+from rotorjax.wake.dynamics import WakeInputs, inputs_of, rhs
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
-from rotorjax.wake.performance import performance
-from rotorjax.wake.segments import releases
 from rotorjax.wake.solution import Solution
 
 Blades = Literal["alike", "all"]
@@ -47,29 +45,6 @@ UNITS = {
 }
 NODES = 4
 """Azimuths within a blade's passage at which the wake over a slope is linearised."""
-
-
-class WakeOutputs(NamedTuple):
-    """What is read off a wake, mean over the blades at one instant.
-
-    CT: T/(ρA(ΩR)²). CQ: Q/(ρA(ΩR)²R), equal to C_P. lambda0: area-mean inflow over ΩR, positive down, climb included.
-    inflow (R,): the same at each station.
-    """
-
-    CT: Float[Array, ""]
-    CQ: Float[Array, ""]
-    lambda0: Float[Array, ""]
-    inflow: Float[Array, " R"]
-
-
-def outputs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, model: FreeWake) -> WakeOutputs:
-    """Outputs of a state (K = 1 or B slices, as for `dynamics.rhs`), slice 0 at azimuth psi."""
-    model = driven(model, inputs)
-    velocities = node_velocities(model, state, psi)
-    start = jax.vmap(lambda s: releases(model, s))(state)
-    loads = blade_loads(model, velocities.control, state.gamma_bound, inputs)
-    found = performance(model, Evaluation(state, velocities, loads, start))
-    return WakeOutputs(found.thrust, found.power, found.mean_inflow, -jnp.mean(velocities.control[..., 2], axis=0))
 
 
 class Base(NamedTuple):
@@ -113,18 +88,17 @@ def _disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> Wak
     return outputs(t, _moved(t, x, base)[0], u, base.model)
 
 
-def residual_of(solution: Solution) -> float:
+def residual_of(solution: Solution, parts: Assembly | None = None) -> float:
     """Relative rms of `dynamics.rhs` at an axisymmetric solution: how far it is from rest. On a slope, of the mean
-    over the blades and the azimuths solved for.
+    over the blades and the azimuths solved for. parts: `assemble(solution)` where it is at hand.
     """
     model, state = solution.model, solution.state
-    u = inputs_of(model)
     if slices(state) == 1:
-        rate = eqx.filter_jit(rhs)(jnp.zeros(()), state, u, model)
-        return relative_rms(_flat(rate), _flat(state))
+        parts = assemble(solution) if parts is None else parts
+        return relative_rms(parts.value[: parts.order], _flat(state))
     base, zero = Base(state, model), jax.tree.map(lambda a: jnp.zeros((1, *a.shape[1:])), state)
     times = np.asarray(azimuths(state))[: slices(state) // model.rotor.blades]
-    rates = [_flat(_compiled(jnp.asarray(t), zero, u, base)) for t in times]
+    rates = [_flat(_compiled(jnp.asarray(t), zero, inputs_of(model), base)) for t in times]
     return relative_rms(np.concatenate(rates), _flat(state))
 
 
@@ -159,18 +133,27 @@ def linear_wake(
     blades: Blades = "alike",
     chunk: int = 64,
     progress: bool = False,
+    parts: Assembly | None = None,
 ) -> PeriodicModel:
     """Linear model of a periodic wake, by `ode.linearise`: time is azimuth (rad), frequencies are per revolution.
 
     inputs: of `WakeInputs` (collective, climb, height over ground); outputs_: of `WakeOutputs`. None takes all. One
-    time where the wake is axisymmetric, NODES of them in a passage 2π/B over a slope.
+    time where the wake is axisymmetric, put together from `parts` (`assemble(solution)`, made here by default); over a
+    slope NODES times in a passage 2π/B, by forward mode.
 
     Raises InputError where the solution has not converged or a name is unknown.
     """
     orbit, u = orbit_of(solution, blades), inputs_of(solution.model)
     chosen = {"inputs": inputs, "outputs": outputs_, "units": UNITS, "chunk": chunk, "progress": progress}
     if slices(solution.state) == 1 and blades == "alike":
-        return linearise(rhs, outputs, orbit, u, solution.model, **chosen)
+        if orbit.converged and parts is None:
+            parts = assemble(solution)
+
+        def derivative(t: Array, x: WakeState) -> tuple[np.ndarray, np.ndarray]:
+            assert parts is not None
+            return parts.value, np.concatenate([parts.jacobian(), parts.by_input], axis=1)
+
+        return linearise(rhs, outputs, orbit, u, solution.model, **chosen, derivative=derivative)
     return linearise(_disturbed_rhs, _disturbed_outputs, orbit, u, Base(solution.state, solution.model), **chosen)
 
 

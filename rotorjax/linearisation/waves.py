@@ -10,19 +10,12 @@ its condition number. Modes are listed with that figure, and those that rounding
 
 from dataclasses import dataclass
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 import scipy.linalg
-from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Complex, Float
+from jaxtyping import Complex
 
-from rotorjax.errors import InputError
-from rotorjax.wake.dynamics import WakeInputs, inputs_of, rates
-from rotorjax.wake.field import node_velocities
-from rotorjax.wake.influence import velocity_response
-from rotorjax.wake.model import FreeWake, WakeState, slices
+from rotorjax.linearisation.assembly import Assembly, assemble
+from rotorjax.ode.threads import one_thread
 from rotorjax.wake.solution import Solution
 
 
@@ -68,46 +61,26 @@ class Spectrum:
     pairing: Pairing
 
 
-def wave_matrix(solution: Solution, wave: int) -> Complex[np.ndarray, "n n"]:
+def wave_matrix(solution: Solution, wave: int, parts: Assembly | None = None) -> Complex[np.ndarray, "n n"]:
     """Derivative of `dynamics.rhs` at an axisymmetric wake, for disturbances of one wave number, per slice.
 
-    n runs over a slice's state as `ravel_pytree` lays it out. Wave number 0 is `system.linear_wake`'s A.
-
-    Raises InputError where the solution has not converged or is not axisymmetric.
+    n runs over a slice's state as `ravel_pytree` lays it out. Wave number 0 is `system.linear_wake`'s A. parts:
+    `assemble(solution)`, made here by default. Raises InputError as `assemble` does.
     """
-    if not solution.converged:
-        raise InputError(f"Argument `solution` must be converged to be linearised, but: {solution.why}")
-    if slices(solution.state) != 1:
-        raise InputError(
-            f"Argument `solution` must be axisymmetric (level ground or none), but has {slices(solution.state)} "
-            "azimuths: wave numbers mix over a slope"
-        )
-    model, state = solution.model, jax.tree.map(jnp.asarray, solution.state)
-    response = velocity_response(model, state, jnp.asarray(2 * np.pi * wave / model.rotor.blades))
-    by_velocity, by_state = _explicit(model, state, inputs_of(model))
-    matrix = np.asarray(by_velocity) @ np.asarray(response).reshape(by_velocity.shape[1], -1)
-    return matrix + np.asarray(by_state)
+    parts = assemble(solution) if parts is None else parts
+    return parts.jacobian(wave)[: parts.order]
 
 
-@eqx.filter_jit
-def _explicit(model: FreeWake, state: WakeState, inputs: WakeInputs) -> tuple[Float[Array, "n V"], Float[Array, "n n"]]:
-    """Derivatives of the rates by the velocities (V of them) and by the state itself at fixed velocities."""
-    v, velocities_of = ravel_pytree(node_velocities(model, state))
-    x, state_of = ravel_pytree(state)
+@one_thread
+def spectrum(solution: Solution, count: int = 4, parts: Assembly | None = None) -> Spectrum:
+    """Exponents of all wave numbers, and the `count` fastest growing modes of each with what rounding does to them.
 
-    def rate(v: Array, x: Array) -> Array:
-        return ravel_pytree(rates(state_of(x), velocities_of(v), inputs, model))[0]
-
-    by_velocity = jax.lax.map(lambda e: jax.jvp(lambda w: rate(w, x), (v,), (e,))[1], jnp.eye(v.size), batch_size=64)
-    by_state = jax.lax.map(lambda e: jax.jvp(lambda y: rate(v, y), (x,), (e,))[1], jnp.eye(x.size), batch_size=64)
-    return by_velocity.T, by_state.T
-
-
-def spectrum(solution: Solution, count: int = 4) -> Spectrum:
-    """Exponents of all wave numbers, and the `count` fastest growing modes of each with what rounding does to them."""
+    parts: `assemble(solution)`, made here by default. Raises InputError as `assemble` does.
+    """
+    parts = assemble(solution) if parts is None else parts
     exponents, modes = {}, []
     for wave in range(solution.model.rotor.blades // 2 + 1):
-        matrix = wave_matrix(solution, wave)
+        matrix = wave_matrix(solution, wave, parts)
         own = 2 * wave % solution.model.rotor.blades == 0  # its own conjugate: a real matrix
         matrix = np.real(matrix) if own else matrix
         values = np.linalg.eigvals(matrix)

@@ -20,24 +20,24 @@ CHUNK = 64
 @eqx.filter_jit
 def _columns(
     f: Callable, unravel: Callable, x: Float[Array, " n"], args: PyTree, first: Array, width: int
-) -> Float[Array, "width m"]:
-    """Columns first..first + width of the Jacobian, as rows; the function itself is evaluated once for all."""
+) -> tuple[Float[Array, " m"], Float[Array, "width m"]]:
+    """f(x), and columns first..first + width of the Jacobian, as rows; f itself is evaluated once for all."""
 
     def flat(v: Array) -> Array:
         return ravel_pytree(f(unravel(v), *args))[0]
 
     numbers = first + jnp.arange(width)
     tangents = (numbers[:, None] == jnp.arange(x.size)[None, :]).astype(x.dtype)
-    return jax.vmap(lambda v: jax.jvp(flat, (x,), (v,))[1])(tangents)
+    return jax.vmap(lambda v: jax.jvp(flat, (x,), (v,)), out_axes=(None, 0))(tangents)
 
 
-def dense_jacobian(
+def value_and_jacobian(
     f: Callable[..., PyTree], x: PyTree, *args: Any, chunk: int = CHUNK, progress: bool = False
-) -> Float[np.ndarray, "m n"]:
-    """Jacobian of f(x, *args) with respect to x by forward mode, `chunk` columns at a time.
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m n"]]:
+    """f(x, *args) and its Jacobian with respect to x by forward mode, `chunk` columns at a time.
 
     x and the value of f are pytrees of floating-point arrays; rows and columns run over their leaves in the order of
-    `jax.flatten_util.ravel_pytree`. Memory on the device is that of `chunk` evaluations; the result is a numpy array.
+    `jax.flatten_util.ravel_pytree`. Memory on the device is that of `chunk` evaluations; the results are numpy arrays.
 
     Raises InputError where `chunk` is not positive.
     """
@@ -47,8 +47,15 @@ def dense_jacobian(
     args = traceable(args)
     width = min(chunk, flat.size)
     starts = range(0, flat.size, width)
-    parts = [
-        np.asarray(_columns(f, unravel, flat, args, jnp.asarray(start), width))
-        for start in tqdm(starts, desc="jacobian", disable=not progress, leave=False)
-    ]
-    return np.concatenate(parts)[: flat.size].T
+    value, parts = np.zeros(0), []
+    for start in tqdm(starts, desc="jacobian", disable=not progress, leave=False):
+        value, columns = _columns(f, unravel, flat, args, jnp.asarray(start), width)
+        parts.append(np.asarray(columns))
+    return np.asarray(value), np.concatenate(parts)[: flat.size].T
+
+
+def dense_jacobian(
+    f: Callable[..., PyTree], x: PyTree, *args: Any, chunk: int = CHUNK, progress: bool = False
+) -> Float[np.ndarray, "m n"]:
+    """The Jacobian alone of `value_and_jacobian`."""
+    return value_and_jacobian(f, x, *args, chunk=chunk, progress=progress)[1]

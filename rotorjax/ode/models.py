@@ -1,12 +1,15 @@
 """Linear state-space models with names and units: periodic in time, and time-invariant."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, cast
 
 import numpy as np
 import scipy.linalg
 from jaxtyping import Complex, Float
 
 from rotorjax.errors import InputError
+from rotorjax.ode.threads import one_thread
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,29 @@ class PeriodicModel:
         return np.array(times), np.array(outputs)
 
 
+class Resolvent:
+    """(s − A)⁻¹ at any s from one Schur form A = Q T Qᴴ: each s then costs a triangular solve, no factorisation."""
+
+    @one_thread
+    def __init__(self, a: Float[np.ndarray, "n n"]):
+        """Factorise A (n, n)."""
+        t, q = cast(Any, scipy.linalg.schur)(a)
+        self._t, self._q = scipy.linalg.rsf2csf(t, q)
+
+    @property
+    def poles(self) -> Complex[np.ndarray, " n"]:
+        """Eigenvalues of A."""
+        return np.diagonal(self._t)
+
+    @one_thread
+    def solve(self, s: complex, b: Float[np.ndarray, "n m"], *, adjoint: bool = False) -> Complex[np.ndarray, "n m"]:
+        """(s − A)⁻¹ b, or (s − A)⁻ᴴ b where adjoint."""
+        shifted = -self._t
+        np.fill_diagonal(shifted, s - self.poles)
+        side = self._q.conj().T @ b
+        return self._q @ scipy.linalg.solve_triangular(shifted, side, trans=2 if adjoint else 0, check_finite=False)
+
+
 @dataclass(frozen=True)
 class LinearModel:
     """dx/dt = A x + B u, y = C x + D u.
@@ -98,16 +124,21 @@ class LinearModel:
         """Number of states."""
         return self.a.shape[0]
 
+    @cached_property
+    def resolvent(self) -> Resolvent:
+        """(s − A)⁻¹, factorised once for all frequencies."""
+        return Resolvent(self.a)
+
     def poles(self) -> Complex[np.ndarray, " n"]:
         """Eigenvalues of A, the slowest first."""
-        values = np.linalg.eigvals(self.a)
+        values = self.resolvent.poles
         return values[np.argsort(np.abs(values))]
 
     def response(self, frequencies: Float[np.ndarray, " W"]) -> Complex[np.ndarray, "W q m"]:
         """Transfer matrix C (iω − A)⁻¹ B + D at angular frequencies ω (rad per unit of time)."""
-        eye = np.eye(self.order)
-        return np.array([self.c @ np.linalg.solve(1j * w * eye - self.a, self.b) + self.d for w in frequencies])
+        return np.array([self.c @ self.resolvent.solve(1j * w, self.b) + self.d for w in frequencies])
 
+    @one_thread
     def step(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N q m"]:
         """Outputs at equally spaced times from 0 after a unit step of each input at time 0, exact at those times."""
         n, m = self.b.shape

@@ -80,12 +80,6 @@ def flat_residual(f: Callable, unravel: Callable, x: Float[Array, " n"], args: P
     return ravel_pytree(value)[0]
 
 
-@eqx.filter_jit
-def flat_value(f: Callable, unravel: Callable, x: Float[Array, " n"], args: PyTree) -> Float[Array, " m"]:
-    """f(x, *args) between flat vectors."""
-    return ravel_pytree(f(unravel(x), *args))[0]
-
-
 class Log:
     """Residual history, best iterate, clock and progress bar of one iteration, kept whatever ends it."""
 
