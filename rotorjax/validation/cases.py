@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 from rotorjax.errors import InputError
 from rotorjax.rotor.rotor_file import closest
-from rotorjax.validation import caradonna_tung, grid, ground, landgrebe, momentum, step
+from rotorjax.validation import caradonna_tung, grid, ground, landgrebe, march, momentum, step
 from rotorjax.validation.case import Subject, ValidationCase
 
-CASES = {c.name: c for c in (caradonna_tung.CASE, momentum.CASE, landgrebe.CASE, ground.CASE, step.CASE, grid.CASE)}
+_ALL = (caradonna_tung, momentum, landgrebe, ground, step, march, grid)
+CASES = {module.CASE.name: module.CASE for module in _ALL}
 QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)
 
 
