@@ -101,11 +101,18 @@ def across(r: np.ndarray, mountain: np.ndarray, valley: np.ndarray) -> tuple[np.
     return np.concatenate([-r[::-1], gap, r]), np.concatenate([valley[::-1], gap, mountain])
 
 
-def polar_contour(axes: Any, r: np.ndarray, psi: np.ndarray, values: np.ndarray, levels: np.ndarray) -> Any:
+def polar_contour(
+    axes: Any,
+    r: np.ndarray,
+    psi: np.ndarray,
+    values: np.ndarray,
+    levels: np.ndarray,
+    sides: tuple[str, str] = ("mountain side", "valley side"),
+) -> Any:
     """Filled contours of values (K, R) over the disk; ψ = 0 (aft, mountain) at the right, ψ = 270° at the top.
 
-    axes: polar. psi: equally spaced over a turn (rad); few azimuths are refined by their Fourier series. Returns the
-    contour set, for a colour bar.
+    axes: polar. psi: equally spaced over a turn (rad); few azimuths are refined by their Fourier series. sides: names
+    of ψ = 0 and 180°. Returns the contour set, for a colour bar.
     """
     psi, values = refine_azimuth(psi, values)
     closed_psi, closed = np.append(psi, psi[0] + 2 * np.pi), np.vstack([values, values[:1]])
@@ -118,7 +125,7 @@ def polar_contour(axes: Any, r: np.ndarray, psi: np.ndarray, values: np.ndarray,
     axes.set_thetagrids(range(0, 360, 90), ["", "ψ = 90°", "", "ψ = 270°"], fontsize=8)
     axes.grid(color="white", linewidth=0.4, alpha=0.5)
     axes.tick_params(pad=1)
-    for x, rotation, text in ((1.05, 270, "mountain side, ψ = 0°"), (-0.05, 90, "valley side, ψ = 180°")):
+    for x, rotation, text in ((1.05, 270, f"{sides[0]}, ψ = 0°"), (-0.05, 90, f"{sides[1]}, ψ = 180°")):
         look = {"rotation": rotation, "ha": "center", "va": "center", "fontstyle": "italic", "fontsize": 8}
         axes.text(x, 0.5, text, transform=axes.transAxes, **look)
     return filled

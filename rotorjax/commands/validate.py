@@ -34,7 +34,8 @@ def run(chosen: argparse.Namespace) -> int:
     subject = Subject(chosen.rotor, chosen.collective, chosen.quick)
     cases = chosen_cases(chosen.case, subject)
     for case in cases:
-        case.points(subject)[0].settings(subject.quick)  # what cannot be had is refused before the folder is made
+        for at in case.points(subject)[:1]:
+            at.settings(subject.quick)  # what cannot be had is refused before the folder is made
     out = make_folder(chosen.out)
     found = validate(cases, subject)
     write(found, out)

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 from rotorjax.errors import InputError
 from rotorjax.rotor.rotor_file import closest
-from rotorjax.validation import caradonna_tung, grid, ground, landgrebe, march, momentum, step
+from rotorjax.validation import caradonna_tung, grid, ground, inflow_map, landgrebe, march, momentum, step
 from rotorjax.validation.case import Subject, ValidationCase
 
-_ALL = (caradonna_tung, momentum, landgrebe, ground, step, march, grid)
+_ALL = (caradonna_tung, momentum, landgrebe, ground, step, march, inflow_map, grid)
 CASES = {module.CASE.name: module.CASE for module in _ALL}
+MEASURED = (caradonna_tung.NAME, inflow_map.NAME)
 QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)
 
 
@@ -22,10 +23,10 @@ def chosen_cases(names: Sequence[str] | None, subject: Subject) -> tuple[Validat
     for name in names or ():
         if name not in CASES:
             raise InputError(f"Argument `case` must name a case, but is '{name}': {closest(name, CASES)}")
-    if subject.rotor is not None and caradonna_tung.NAME in (names or ()):
-        raise InputError(
-            f"Argument `case` must not hold '{caradonna_tung.NAME}' with a rotor of one's own: "
-            "it is measured at 8 deg on its own rotor"
-        )
-    wanted = names or [n for n in (QUICK if subject.quick else CASES) if n != caradonna_tung.NAME or not subject.rotor]
+    for name in MEASURED:
+        if subject.rotor is not None and name in (names or ()):
+            raise InputError(
+                f"Argument `case` must not hold '{name}' with a rotor of one's own: it was measured on its own rotor"
+            )
+    wanted = names or [n for n in (QUICK if subject.quick else CASES) if n not in MEASURED or not subject.rotor]
     return tuple(case for name, case in CASES.items() if name in wanted)

@@ -51,6 +51,8 @@ def summary(found: Validation) -> dict[str, Any]:
 
 
 def wake_settings_of(found: Validation) -> dict[str, Any]:
-    """Settings of the wake that all cases share, by name."""
-    at = next(p for p in found.wakes if not p.changes)
+    """Settings of the wake that all cases share, by name; none where no case needed a wake."""
+    at = next((p for p in found.wakes if not p.changes), None)
+    if at is None:
+        return {}
     return {k: v for k, v in at.settings(found.subject.quick).table().items() if k.startswith("wake.")}
