@@ -27,14 +27,22 @@ def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> 
 
 
 def _solve(
-    product: Callable, b: Float[Array, " n"], method: Method, chunk: int, restart: int, inverse: Array | None
+    product: Callable,
+    b: Float[Array, " n"],
+    method: Method,
+    chunk: int,
+    restart: int,
+    inverse: Array | None,
+    refinements: int,
 ) -> Float[Array, " n"]:
     """Solve product(v) = b so that jax can differentiate and transpose it."""
     if inverse is not None:
-        # refined once: a given inverse has lost the digits that the matrix's condition costs
+
         def refined(matrix: Callable, v: Array, inverse: Array) -> Array:
-            first = inverse @ v
-            return first + inverse @ (v - matrix(first))
+            found = inverse @ v
+            for _ in range(refinements):
+                found = found + inverse @ (v - matrix(found))
+            return found
 
         return jax.lax.custom_linear_solve(
             product,
@@ -70,6 +78,7 @@ def _tangent(
     chunk: int,
     restart: int,
     inverse: Array | None = None,
+    refinements: int = 1,
 ) -> PyTree:
     """Solve F_x dx = −F_p dp at the solution."""
     flat, unravel = ravel_pytree(solution)
@@ -82,7 +91,7 @@ def _tangent(
 
     _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
     _, product = jax.linearize(of_state, flat)
-    return unravel(_solve(product, -push, method, chunk, restart, inverse))
+    return unravel(_solve(product, -push, method, chunk, restart, inverse, refinements))
 
 
 def attach(
@@ -93,6 +102,7 @@ def attach(
     chunk: int = CHUNK,
     restart: int = 60,
     inverse: Float[Array, "n n"] | None = None,
+    refinements: int = 1,
 ) -> PyTree:
     """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
 
@@ -101,9 +111,9 @@ def attach(
 
     method: "dense" makes and factorises the Jacobian once (`chunk` columns at a time) for all directions; "gmres"
     needs no matrix, at most 20 cycles of `restart` products, and gives NaN rather than a derivative that it could not
-    solve for. inverse: that of ∂F/∂x over the raveled solution where the caller has it, instead of either; it is
-    applied twice, so that it need not be exact to the last digits. Derivatives flow through `args` only, not through
-    arrays that `residual` closes over.
+    solve for. inverse: that of ∂F/∂x over the raveled solution where the caller has it, instead of either. Each of the
+    `refinements` takes one product with ∂F/∂x and makes good what the inverse misses; an exact one needs none, and the
+    program is then half as long. Derivatives flow through `args` only, not through arrays that `residual` closes over.
 
     Raises InputError where `method` is unknown.
     """
@@ -117,7 +127,7 @@ def attach(
     def rule(primals: tuple, tangents: tuple) -> tuple:
         # The value again, and not `solution`: second derivatives must see how it moves.
         x = value(*primals)
-        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, inverse)
+        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, inverse, refinements)
 
     return value(jax.lax.stop_gradient(solution), traceable(args))
 

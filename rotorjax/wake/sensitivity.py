@@ -34,4 +34,4 @@ def periodic_wake(solution: Solution, model: FreeWake) -> Unknowns:
         )
     with jax.ensure_compile_time_eval():  # the solution is at hand: nothing of this belongs into the caller's program
         inverse = jnp.real(harmonic_inverse(solution.model, x, 1).inverse[0])
-    return attach(residual, jax.tree.map(jnp.asarray, x), model, inverse=inverse)
+    return attach(residual, jax.tree.map(jnp.asarray, x), model, inverse=inverse, refinements=0)
