@@ -101,8 +101,24 @@ def still_state(p: CoupledRotor, u: RotorInputs, thrust: float) -> CoupledState:
 
 def rhs(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> CoupledState:
     """Rate of the state per radian of Ω_ref t; t itself does not enter."""
+    return rate_and_output(t, x, u, p)[0]
+
+
+def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> Outputs:
+    """Loads, power and blade motion at one instant."""
+    return rate_and_output(t, x, u, p)[1]
+
+
+def rate_and_output(
+    t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor
+) -> tuple[CoupledState, Outputs]:
+    """Both from one evaluation of the blades."""
     del t
     found = _evaluate(x, u, p)
+    return _rate(found, x, u, p), _output(found, u, p)
+
+
+def _rate(found: _Evaluation, x: CoupledState, u: RotorInputs, p: CoupledRotor) -> CoupledState:
     flap, lag = (
         multiblade.accelerations(found.q_dot_dot[:, i], q, q_dot, x.psi, u.omega, u.omega_rate)
         for i, (q, q_dot) in enumerate([(x.rotor.flap, x.rotor.flap_rate), (x.rotor.lag, x.rotor.lag_rate)])
@@ -111,10 +127,7 @@ def rhs(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -
     return CoupledState(u.omega, rotor, p.inflow.rate(x.inflow, found.loads, u))
 
 
-def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> Outputs:
-    """Loads, power and blade motion at one instant."""
-    del t
-    found = _evaluate(x, u, p)
+def _output(found: _Evaluation, u: RotorInputs, p: CoupledRotor) -> Outputs:
     on_hub = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(
         found.frames, found.q, found.q_dot, found.q_dot_dot, found.air.force, found.air.moment
     )

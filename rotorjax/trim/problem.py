@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
-from rotorjax.coupled import CoupledRotor, CoupledState, Outputs, RotorState, output, rhs
+from rotorjax.coupled import CoupledRotor, CoupledState, Outputs, RotorState, rate_and_output
 from rotorjax.ode.collocation import Collocation, unfold
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import RotorInputs
@@ -72,13 +72,12 @@ def inputs_at(controls: Controls, flight: Flight) -> RotorInputs:
     )
 
 
-class PeriodicRates(eqx.Module):
-    """rhs of the coupled rotor without its azimuth, which is the time of a rotor that turns steadily."""
+class Still(eqx.Module):
+    """A right-hand side of zero: with it the collocation's residual is the slope of the orbit alone."""
 
-    def __call__(self, psi: Array, x: tuple[RotorState, PyTree], u: RotorInputs, p: CoupledRotor) -> tuple:
-        """Rates of (flap and lag, inflow)."""
-        rate = rhs(psi, CoupledState(psi, *x), u, p)
-        return rate.rotor, rate.inflow
+    def __call__(self, psi: Array, x: PyTree) -> PyTree:
+        """Zeros like x."""
+        return jax.tree.map(jnp.zeros_like, x)
 
 
 class NextBlade(eqx.Module):
@@ -100,18 +99,16 @@ class TrimResidual(eqx.Module):
     aim: Aim = eqx.field(static=True, default="flapping")
     balance: bool = eqx.field(static=True, default=False)
 
-    @property
-    def collocation(self) -> Collocation:
-        """The orbit's equations."""
-        if self.blades == 1:
-            return Collocation(PeriodicRates())
-        return Collocation(PeriodicRates(), NextBlade(self.blades), self.blades)
+    def slopes(self, z: Trim) -> tuple[RotorState, PyTree]:
+        """d/dψ of the states at the nodes, from their trigonometric interpolant."""
+        symmetry = None if self.blades == 1 else NextBlade(self.blades)
+        derivative = Collocation(Still(), symmetry, self.blades)
+        return derivative((z.rotor, z.inflow), jnp.zeros(()), jnp.asarray(2 * jnp.pi))
 
     def __call__(self, z: Trim, flight: Flight, p: CoupledRotor) -> Trim:
         """Residual, shaped like the unknowns."""
-        u = inputs_at(z.controls, flight)
-        orbit = self.collocation((z.rotor, z.inflow), jnp.zeros(()), jnp.asarray(2 * jnp.pi), u, p)
-        found = outputs_at(z, flight, p)
+        rates, found = rates_and_outputs(z, flight, p)
+        orbit = jax.tree.map(jnp.subtract, self.slopes(z), (rates.rotor, rates.inflow))
         force, moment = jnp.mean(found.force, axis=0), jnp.mean(found.moment, axis=0)
         cosine, sine = (moment[1], moment[0]) if self.aim == "moments" else cyclic(found.flap, p)
         tilt = z.controls.tilt - flight.tilt
@@ -129,14 +126,20 @@ def node_azimuths(z: Trim, blades: int) -> Float[Array, " K"]:
     return 2 * jnp.pi / (nodes * blades) * jnp.arange(nodes)
 
 
-def outputs_at(z: Trim, flight: Flight, p: CoupledRotor) -> Outputs:
-    """Outputs at all nodes, leading axis K: equal weights make them means over time."""
+def rates_and_outputs(z: Trim, flight: Flight, p: CoupledRotor) -> tuple[CoupledState, Outputs]:
+    """Rates and outputs at all nodes, leading axis K."""
     u = inputs_at(z.controls, flight)
 
     def at(psi, rotor, inflow):
-        return output(psi, CoupledState(psi, rotor, inflow), u, p)
+        return rate_and_output(psi, CoupledState(psi, rotor, inflow), u, p)
 
     return jax.vmap(at)(node_azimuths(z, p.rotor.blades), z.rotor, z.inflow)
+
+
+@eqx.filter_jit
+def outputs_at(z: Trim, flight: Flight, p: CoupledRotor) -> Outputs:
+    """Outputs at all nodes, leading axis K: equal weights make them means over time."""
+    return rates_and_outputs(z, flight, p)[1]
 
 
 def cyclic(flap: Float[Array, "K B"], p: CoupledRotor) -> tuple[Float[Array, ""], Float[Array, ""]]:

@@ -1,0 +1,136 @@
+"""A flight of the coupled rotor: case files in TOML.
+
+    [flight]                   # where it starts, trimmed; the keys are those of `rotorjax trim`
+    rotor = "uh60"
+    inflow = "pitt-peters"
+    thrust_coefficient = 0.00575
+    advance_ratio = 0.1        # optional, as are height, slope_deg, tilt_deg and drag_area
+    height = 2.0
+
+    [time]
+    duration = 3.0             # s
+    steps_per_turn = 120       # optional
+
+    [history]                  # optional: what is added to the trim, smooth between the points
+    t = [0.0, 0.5, 0.6, 3.0]   # s
+    collective_deg = [0.0, 0.0, 1.0, 1.0]
+
+Further columns: theta_1c_deg, theta_1s_deg; u, v, w: velocity of the hub in m/s, forward, to starboard and down along
+the shaft's axes; p_deg, q_deg, r_deg: its angular rates in deg/s; rotor_speed: Ω in per cent of the nominal one. Their
+rates, Ω̇ included, follow from them. Over ground the height follows from the hub's vertical velocity. The hub's attitude
+is not carried along: gravity stays along the shaft, and u, v, w are what they are said to be.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import PPoly
+
+from rotorjax.errors import InputError
+from rotorjax.rotor.checks import check_number
+from rotorjax.rotor.rotor_file import closest
+from rotorjax.simulation.history import read_history, smooth
+from rotorjax.trim.run import Request
+
+COLUMNS = (
+    *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
+    *("u", "v", "w", "p_deg", "q_deg", "r_deg", "rotor_speed"),
+)
+"""In the order of Eq. 11."""
+_FLIGHT = ("rotor", "inflow", "thrust_coefficient", "advance_ratio", "height", "slope_deg", "tilt_deg", "drag_area")
+_KEYS = {"flight": _FLIGHT, "time": ("duration", "steps_per_turn"), "history": None}
+_MOST_STEPS = 200_000
+
+
+@dataclass(frozen=True)
+class SimulationCase:
+    """One flight. request: the trim that it starts from. duration (s). steps_per_turn. t (P,) in s, columns (P, 10):
+    what is added to the trim, in the file's units and the order of COLUMNS; rotor_speed is what it is.
+    """
+
+    request: Request
+    duration: float
+    steps_per_turn: int
+    t: Float[np.ndarray, " P"]
+    columns: Float[np.ndarray, "P C"]
+
+    def polynomials(self) -> PPoly:
+        """Smooth histories over time in s."""
+        return smooth(self.t, self.columns)
+
+
+def read_case(path: str | Path) -> SimulationCase:
+    """Read a case file.
+
+    Raises InputError, naming file and key, for a file that is not there or not TOML, an unknown or missing key, a value
+    that is not allowed, or a history with a gap.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: the file must be readable text, but is not: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: the file must be TOML, but is not: {error}") from None
+    try:
+        return _build(data, path.parent)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _build(data: dict[str, Any], folder: Path) -> SimulationCase:
+    _check_keys(data)
+    flight, times = data["flight"], data["time"]
+    duration = float(check_number("time.duration", times["duration"], 0.0, open_=True))  # type: ignore[arg-type]
+    steps = times.get("steps_per_turn", 120)
+    if isinstance(steps, bool) or not isinstance(steps, int) or not 24 <= steps <= 1440 or steps % 12:
+        raise InputError(f"[time] steps_per_turn must be a multiple of 12 from 24 to 1440, but is {steps!r}")
+    history = dict(data.get("history", {}))
+    t, columns = read_history(history, COLUMNS, duration)
+    if "rotor_speed" not in history:
+        columns[:, -1] = 100.0
+    slow = np.flatnonzero((columns[:, -1] < 50) | (columns[:, -1] > 150))
+    if slow.size:
+        value = columns[slow[0], -1]
+        raise InputError(f"[history] rotor_speed must lie in [50, 150] per cent, but is {value:g} at {t[slow[0]]:g} s")
+    return SimulationCase(_request(flight, folder), duration, steps, t, columns)
+
+
+def _request(flight: dict[str, Any], folder: Path) -> Request:
+    names = {"thrust_coefficient": "thrust", "advance_ratio": "advance"}
+    values = {names.get(k, k): v for k, v in flight.items()}
+    rotor = values.get("rotor", "uh60")
+    if not isinstance(rotor, str) or not isinstance(values.get("inflow", ""), str):
+        raise InputError("[flight] rotor and inflow must be names in quotes")
+    for name, value in values.items():
+        if name not in ("rotor", "inflow"):
+            check_number(f"flight.{name}", value)
+    values["rotor"] = str(folder / rotor) if rotor.endswith(".toml") else rotor
+    return Request(**values)
+
+
+def _check_keys(data: dict[str, Any]) -> None:
+    for table, values in data.items():
+        if table not in _KEYS:
+            raise InputError(f"[{table}] is not a known table: {closest(table, _KEYS)}")
+        if not isinstance(values, dict):
+            raise InputError(f"[{table}] must be a table, but is {values!r}")
+        for key in values:
+            if _KEYS[table] is not None and key not in _KEYS[table]:  # type: ignore[operator]
+                raise InputError(f"[{table}] has the unknown key '{key}': {closest(key, _KEYS[table])}")
+    for table, key in (("flight", "thrust_coefficient"), ("time", "duration")):
+        if key not in data.get(table, {}):
+            raise InputError(f"[{table}] must have the key '{key}', but it is missing")
+
+
+def steps_of(case: SimulationCase, omega: float) -> int:
+    """Number of steps of the march, a multiple of twelve. Raises InputError where they are too many."""
+    turns = case.duration * omega / (2 * np.pi)
+    steps = 12 * max(1, round(turns * case.steps_per_turn / 12))
+    if steps > _MOST_STEPS:
+        raise InputError(f"[time] duration must make at most {_MOST_STEPS} steps, but {case.duration:g} s make {steps}")
+    return steps

@@ -1,0 +1,194 @@
+"""A flight as labelled arrays, as a report, as pictures and as an animation."""
+
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.figure import Figure
+
+from rotorjax import plotting
+from rotorjax.coupled import CoupledRotor, sections_of
+from rotorjax.io.atomic import whole_file
+from rotorjax.rotor import multiblade
+from rotorjax.simulation.run import SAVES, Simulated
+
+_RAYS, _RADII, _MOST_FRAMES = 36, 16, 90
+_LINES = ("-", "--", ":", "-.", (0, (1, 3)))
+
+
+def dataset(found: Simulated) -> xr.Dataset:
+    """Histories over time: inputs, multi-blade angles, coefficients, hub loads in SI, and the inflow over the disk."""
+    p, flown = found.start.p, found.flown
+    u, x, y = flown.u, flown.x, flown.y
+    degrees = {"units": "deg"}
+    radius, tip = float(p.rotor.radius), float(p.operating.tip_speed(p.rotor.radius))
+    force = float(p.operating.density) * np.pi * radius**2 * tip**2
+    omega = float(p.operating.omega)
+    data = xr.Dataset(
+        coords={
+            "time": ("time", np.asarray(flown.t) / omega, {"units": "s"}),
+            "coordinate": list(multiblade.names(p.rotor.blades)),
+            "blade": np.arange(p.rotor.blades),
+            "axis": ["aft", "starboard", "up"],
+        },
+        attrs={"rotor": p.rotor.name, "inflow": found.case.request.inflow, "finished": int(found.finished)},
+    )
+    data["azimuth"] = ("time", np.asarray(x.psi), {"units": "rad"})
+    for name in ("theta_0", "theta_1c", "theta_1s"):
+        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
+    for name in ("u", "v", "w"):
+        data[name] = ("time", np.asarray(getattr(u, name)) * tip, {"units": "m/s"})
+    for name in ("p", "q", "r"):
+        data[name] = ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"})
+    data["rotor_speed"] = ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})
+    if u.height is not None:
+        data["height"] = ("time", np.asarray(u.height), {"long_name": "hub above ground over R"})
+    data["flap"] = (("time", "coordinate"), np.rad2deg(x.rotor.flap), degrees)
+    data["lag"] = (("time", "coordinate"), np.rad2deg(x.rotor.lag), degrees)
+    data["blade_flap"] = (("time", "blade"), np.rad2deg(y.flap), degrees)
+    for name in ("CT", "CQ", "CP_induced", "CP_profile", "CP_parasite", "CP_damper"):
+        data[name] = ("time", np.asarray(getattr(y, name)))
+    data["hub_force"] = (("time", "axis"), np.asarray(y.force) * force, {"units": "N"})
+    data["hub_moment"] = (("time", "axis"), np.asarray(y.moment) * force * radius, {"units": "N m"})
+    data["largest_alpha"] = ("time", np.rad2deg(np.max(np.asarray(y.alpha), axis=(1, 2))), degrees)
+    return data.assign(_frames(found, p))
+
+
+def _frames(found: Simulated, p: CoupledRotor) -> dict[str, xr.DataArray]:
+    """The inflow over the disk at up to _MOST_FRAMES instants, one save in a whole number."""
+    import jax
+
+    count = found.flown.t.size
+    every = max(1, -(-count // _MOST_FRAMES))
+    at = np.arange(0, count, every)
+    r = np.linspace(float(sections_of(p).r[0]), float(sections_of(p).r[-1]), _RADII)
+    psi = 2 * np.pi / _RAYS * np.arange(_RAYS)
+    points = np.stack([r * np.cos(psi)[:, None], r * np.sin(psi)[:, None], 0 * r * psi[:, None]], axis=-1)
+
+    def field(row):
+        return -p.inflow.velocity(row[0], jnp.asarray(points), row[1])[..., 2]
+
+    rows = jax.tree.map(lambda v: v[at], (found.flown.x.inflow, found.flown.u))
+    fields = np.asarray(jax.jit(lambda rows: jax.lax.map(field, rows, batch_size=16))(rows))
+    coords = {"frame": at, "ray": ("ray", psi, {"units": "rad"}), "radius": r}
+    attrs = {"long_name": "λ over ΩR, positive down"}
+    return {"inflow": xr.DataArray(fields, coords, ("frame", "ray", "radius"), attrs=attrs)}
+
+
+def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
+    """How it went and how fast: seconds of the march per revolution and against the clock."""
+    flown_s = float(data["time"][-1])
+    turns = float(data["azimuth"][-1]) / (2 * np.pi)
+    names = [n for n in ("height", "CT", "CQ", "rotor_speed", "largest_alpha") if n in data]
+    series = {n: data[n].values for n in names}
+    series |= {f"beta_{c}_deg": data["flap"].sel(coordinate=c).values for c in data["coordinate"].values}
+    return {
+        "rotor": data.attrs["rotor"],
+        "inflow": data.attrs["inflow"],
+        "finished": found.finished,
+        "why": found.why,
+        "steps": found.steps,
+        "simulated_s": flown_s,
+        "revolutions": turns,
+        "march_s": found.march_s,
+        "march_s_per_revolution": found.march_s / turns,
+        "real_time_factor": flown_s / found.march_s,
+        "histories": {
+            n: {"first": v[0], "last": v[-1], "min": float(np.min(v)), "max": float(np.max(v))}
+            for n, v in series.items()
+        },
+    }
+
+
+def histories(data: xr.Dataset) -> Figure:
+    """Controls, flapping, thrust and power, hub motion over time."""
+    t = data["time"].values
+    with plotting.style():
+        figure = plotting.new_figure(9.0, 6.0)
+        controls, flapping, loads, motion = figure.subplots(2, 2, sharex=True).flat
+        for name, label, line in zip(("theta_0", "theta_1c", "theta_1s"), ("0", "1c", "1s"), _LINES, strict=False):
+            added = data[name] - data[name][0]
+            controls.plot(t, added, ls=line, label=rf"$\theta_{{{label}}}$ {float(data[name][0]):+.2f}°")
+        controls.set(ylabel="pitch less the trim's, deg")
+        for name, line in zip(data["coordinate"].values, _LINES, strict=False):
+            flapping.plot(t, data["flap"].sel(coordinate=name), ls=line, label=rf"$\beta_{{{name}}}$")
+        flapping.set(ylabel="flap, deg")
+        for name, label, line in (("CT", r"$C_T$", "-"), ("CQ", r"$C_Q$", "--")):
+            turned = _over_a_turn(data[name].values)
+            loads.plot(t, turned / turned[0], ls=line, label=f"{label} / {turned[0]:.3e}")
+        loads.set(xlabel="time, s", ylabel="mean over a revolution, over the first")
+        for name in ("u", "v", "w"):
+            if float(abs(data[name]).max()) > 1e-9:
+                motion.plot(t, data[name], label=f"${name}$, m/s")
+        for name in ("p", "q", "r"):
+            if float(abs(data[name]).max()) > 1e-9:
+                motion.plot(t, data[name], ls="--", label=f"${name}$, deg/s")
+        motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
+        if "height" in data:
+            motion.plot(t, data["height"], ls="-.", color=plotting.INK, label="height over $R$")
+        motion.set(xlabel="time, s", ylabel="hub")
+        for axes in (controls, flapping, loads, motion):
+            axes.legend(loc="best", fontsize=8)
+    return figure
+
+
+def _over_a_turn(values: np.ndarray) -> np.ndarray:
+    """Running mean over one revolution, the ends repeated."""
+    kernel = np.ones(SAVES) / SAVES
+    padded = np.concatenate([np.repeat(values[:SAVES].mean(), SAVES // 2), values, np.repeat(values[-1], SAVES - 1)])
+    padded[-(SAVES - 1) :] = values[-SAVES:].mean()
+    return np.convolve(padded, kernel, "valid")[: values.size]
+
+
+def animation(found: Simulated, data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -> None:
+    """Write a GIF: blades from the side with their flapping drawn large, the inflow from above, thrust so far."""
+    frames, psi = data["frame"].values, np.append(data["ray"].values, 2 * np.pi)
+    fields = data["inflow"].values
+    fields = np.concatenate([fields, fields[:, :1]], axis=1)
+    r = data["radius"].values
+    x, y = r * np.cos(psi)[:, None], r * np.sin(psi)[:, None]
+    large, thrust, t = 3.0, _over_a_turn(data["CT"].values), data["time"].values
+    with mpl.rc_context({**plotting.STYLE, "figure.dpi": 80}):  # type: ignore[arg-type]
+        figure = plotting.new_figure(9.0, 3.4)
+        side, disk, history = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.2))
+        levels = plotting.shared_levels([fields])
+        mesh = disk.pcolormesh(x, y, fields[0], shading="gouraud", vmin=levels[0], vmax=levels[-1], cmap="viridis")
+        disk.set(aspect="equal", xticks=[], yticks=[], title="inflow from above", xlabel="forward ← → aft")
+        disk.invert_yaxis()
+        disk.grid(visible=False)
+        figure.colorbar(mesh, ax=disk, shrink=0.7, label=r"$\lambda$")
+        spokes = [disk.plot([], [], color="white", lw=1.2)[0] for _ in data["blade"]]
+        history.plot(t, thrust, color=plotting.FREE_WAKE)
+        (dot,) = history.plot([], [], "o", color=plotting.INK, ms=5)
+        history.set(xlabel="time, s", ylabel=r"$C_T$, mean over a revolution")
+        lowest = -float(data["height"].max()) if "height" in data else -0.6
+        side.set(xlim=(-1.15, 1.15), ylim=(min(lowest, -0.6) - 0.1, 0.8), aspect="equal", xticks=[], yticks=[])
+        side.set_xlabel("forward ← → aft")
+        side.grid(visible=False)
+        blades = [side.plot([], [], color=plotting.INK, lw=2)[0] for _ in data["blade"]]
+        (floor,) = side.plot([], [], color="#888888", lw=3)
+
+        def draw(frame: int) -> list[Any]:
+            at = int(frames[frame])
+            mesh.set_array(fields[frame])
+            for k, (blade, spoke) in enumerate(zip(blades, spokes, strict=True)):
+                azimuth = float(data["azimuth"][at]) + 2 * np.pi * k / len(blades)
+                flap = np.deg2rad(large * float(data["blade_flap"][at, k]))
+                blade.set_data([0, np.cos(azimuth) * np.cos(flap)], [0, np.sin(flap)])
+                spoke.set_data([0, np.cos(azimuth)], [0, np.sin(azimuth)])
+            if "height" in data:
+                floor.set_data([-1.15, 1.15], 2 * [-float(data["height"][at])])
+            dot.set_data([t[at]], [thrust[at]])
+            side.set_title(f"t = {t[at]:.2f} s, flapping ×{large:g}")
+            return [mesh, dot]
+
+        draw(0)
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # laid out once, not again for each frame
+        film = FuncAnimation(figure, draw, frames=len(frames), blit=False)
+        with whole_file(path) as temporary:
+            film.save(temporary, writer=PillowWriter(fps=frames_per_second))

@@ -1,0 +1,203 @@
+"""Solving for trim in the free wake, and what it comes to.
+
+In hover the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts
+from a prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.inflow.momentum import hover_inflow
+from rotorjax.ode.anderson import anderson
+from rotorjax.ode.linear import Krylov
+from rotorjax.ode.newton import newton
+from rotorjax.ode.outcome import Outcome
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.flap_lag import blade_of
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.rotor.hub import RotorInputs
+from rotorjax.trim.free_wake import InWake, Loads, WakeTrim, first_guess, flown, harmonic, loads_of, residual
+from rotorjax.wake.equilibrium import Evaluation, evaluate
+from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
+from rotorjax.wake.solution import solve
+
+Progress = Callable[[str, float], None]
+
+TOL = 1e-7
+"""Relative rms of the residual of wake, flapping and controls together."""
+
+THICKER = 1.6
+"""Cores at the start in a wind, over the settings': with them Anderson's iteration converges from a prescribed wake."""
+
+
+@dataclass(frozen=True)
+class TrimmedInWake:
+    """A trim in the free wake, converged or not. outcome: of the last Newton iteration; iterations: of all of them."""
+
+    z: InWake
+    p: WakeTrim
+    outcome: Outcome
+    iterations: int
+
+    @property
+    def model(self) -> FreeWake:
+        """The free wake's model as flown."""
+        return flown(self.z, self.p)
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s (rad)."""
+
+    CT: float
+    CQ: float
+    CP_induced: float
+    CP_profile: float
+    CP_parasite: float
+    flap: np.ndarray
+
+
+def wake_trim(
+    rotor: Rotor,
+    operating: OperatingPoint,
+    inputs: RotorInputs,
+    thrust: float,
+    ground: Plane | None = None,
+    settings: WakeSettings | None = None,
+) -> WakeTrim:
+    """Set a trim up. Raises InputError where the rotor has no hinge data, or as `free_wake` does."""
+    if settings is None:
+        settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
+    still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
+    model = free_wake(rotor, still, ground, settings)
+    return WakeTrim(model, blade_of(rotor, operating), inputs, jnp.asarray(thrust, float))
+
+
+def windy(inputs: RotorInputs) -> bool:
+    """Whether the hub moves across the air: then no azimuth is like another."""
+    return bool(np.any(np.asarray(inputs.velocity)[:2] != 0))
+
+
+def trim_in_wake(
+    p: WakeTrim, controls: Float[Array, "3"], coning: float, progress: Progress | None = None
+) -> TrimmedInWake:
+    """Trim from a guess of the controls θ₀, θ₁c, θ₁s and of the coning (rad).
+
+    progress(stage, residual) is called as things go on. A trim that does not converge comes back with its reason.
+    Raises InputError where the hub climbs over ground.
+    """
+    if p.model.ground is not None and float(p.inputs.climb) != 0:
+        raise InputError(
+            f"Argument `inputs` must not move along the shaft over ground (a steady state needs a fixed height), but "
+            f"its climb is {float(p.inputs.climb):g}: set tilt = 0 and climb = 0"
+        )
+    stages = _Stages(progress)
+    if windy(p.inputs):
+        return _from_wind(p, controls, coning, stages)
+    return _from_hover(p, controls, coning, stages)
+
+
+def means(found: TrimmedInWake) -> Means:
+    """Performance of a trim."""
+    evaluation, loads = evaluated(found.z, found.p)
+    p, blades = found.p, found.p.model.rotor.blades
+    model = found.model
+    flight = model.flight
+    assert flight is not None
+    arm = flight.hinge + (model.stations - flight.hinge) * jnp.cos(found.z.flap)[:, None]
+    slices = found.z.flap.shape[0]
+    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+
+    def mean(power) -> float:
+        return float(blades / jnp.pi * jnp.mean(power))
+
+    force = jnp.einsum("r,krc->kc", model.widths, loads.force)
+    along = force[:, 0] * jnp.cos(psi) - force[:, 1] * jnp.sin(psi)
+    across = force[:, 0] * jnp.sin(psi) + force[:, 1] * jnp.cos(psi)
+    hub = jnp.stack([along, across, force[:, 2]], axis=-1)
+    del evaluation
+    return Means(
+        CT=mean(force[:, 2]),
+        CQ=mean(-(arm * loads.force[..., 1]) @ model.widths),
+        CP_induced=mean(loads.induced),
+        CP_profile=mean(loads.profile),
+        CP_parasite=mean(hub @ p.inputs.velocity),
+        flap=np.asarray(harmonic(found.z.flap)),
+    )
+
+
+@eqx.filter_jit
+def evaluated(z: InWake, p: WakeTrim) -> tuple[Evaluation, Loads]:
+    """Wake and air loads of unknowns."""
+    model = flown(z, p)
+    found = evaluate(model, z.wake)
+    return found, loads_of(model, found)
+
+
+class _Stages:
+    """Counts iterations and shows how far things are."""
+
+    def __init__(self, progress: Progress | None) -> None:
+        self._progress, self.iterations = progress, 0
+
+    def done(self, stage: str, outcome: Outcome) -> Outcome:
+        self.iterations += outcome.iterations
+        if self._progress is not None:
+            self._progress(stage, outcome.residual)
+        return outcome
+
+    def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+        linear = Krylov(forcing=0.03, restart=120, restarts=1)
+        return self.done(stage, newton(residual, z, p, linear=linear, tol=tol, max_iterations=12))
+
+
+def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
+    model = eqx.tree_at(
+        lambda m: (m.operating.collective, m.operating.climb),
+        p.model,
+        (controls[0], p.inputs.climb * p.model.operating.tip_speed(p.model.rotor.radius)),
+    )
+    rigid = solve(model, progress=stages._progress)
+    slices = rigid.state.near.shape[0]
+    z = InWake(rigid.unknowns, jnp.full(slices, float(coning)), controls.at[1:].set(0.0))
+    if rigid.converged:
+        outcome = stages.newton("trim", z, p, TOL)
+    else:
+        outcome = Outcome(z, rigid.residual, (rigid.residual,), 0, False, f"rigid blades: {rigid.why}", 0.0)
+    return TrimmedInWake(outcome.x, p, outcome, stages.iterations + rigid.iterations)
+
+
+def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
+    inflow = 0.02 + 0.5 * float(hover_inflow(p.thrust, p.inputs) + p.inputs.climb)
+    guess = first_guess(p, controls, coning, p.model.settings.azimuths, inflow)
+    thick = _with_cores(p, THICKER)
+    first = stages.done(
+        "prescribed wake",
+        anderson(
+            residual, guess, thick, mixing=0.3, window=15, tol=5e-4, max_iterations=150, difference=True
+        ),
+    )
+    outcome = stages.newton("thick cores", first.x, thick, 1e-5)
+    if outcome.converged:
+        outcome = stages.newton("trim", outcome.x, p, TOL)
+    else:
+        p = thick
+    return TrimmedInWake(outcome.x, p, outcome, stages.iterations)
+
+
+def _with_cores(p: WakeTrim, factor: float) -> WakeTrim:
+    """The trim with thicker cores in the wake."""
+
+    def cores(q):
+        s = q.model.settings
+        return s.tip_core, s.near_core, s.bound_core_chords
+
+    return eqx.tree_at(cores, p, tuple(factor * c for c in cores(p)))
