@@ -10,13 +10,14 @@ def register(commands: argparse._SubParsersAction) -> None:
         "trim",
         help="controls, flapping and power of a rotor in hover or forward flight",
         description="Find the controls that give a thrust without cyclic flapping (or hub moments), with the periodic "
-        "motion of the blades and the inflow. Exit code 1 where it did not converge.",
+        "motion of the blades and the inflow. Several speeds or heights make a curve at constant thrust. Exit code 1 "
+        "where one did not converge.",
     )
     add = parser.add_argument
     add("--rotor", default="uh60", metavar="NAME|FILE", help="catalogue name or TOML file (uh60)")
     add("--thrust-coefficient", required=True, type=float, metavar="CT", help="T/(ρA(ΩR)²), along the shaft")
-    add("--advance-ratio", type=float, default=0.0, metavar="MU", help="horizontal speed over ΩR (0)")
-    add("--height", type=float, metavar="H", help="hub over ground, over R (none: out of ground effect)")
+    add("--advance-ratio", type=float, nargs="+", default=[0.0], metavar="MU", help="horizontal speed over ΩR (0)")
+    add("--height", type=float, nargs="+", metavar="H", help="hub over ground, over R (none: out of ground effect)")
     add("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     add("--climb", type=float, default=0.0, metavar="V", help="vertical speed over ΩR (0)")
     add("--inflow", default="pitt-peters", metavar="MODEL", help="uniform, pitt-peters (default) or vpbfsm")
@@ -26,32 +27,44 @@ def register(commands: argparse._SubParsersAction) -> None:
     shaft.add_argument(
         "--drag-area", type=float, metavar="M2", help="of a fuselage; the shaft tilts to balance its drag"
     )
-    add("--json", type=Path, metavar="FILE", help="all numbers")
+    add("--json", type=Path, metavar="FILE", help="all numbers; of a curve a list of them under `points`")
+    add("--plot", type=Path, metavar="FILE", help="picture of a curve: .png, .pdf or .svg")
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
+    from rotorjax.errors import InputError
     from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.plotting import save_file
+    from rotorjax.study.single_output import check_picture
+    from rotorjax.trim.curve import curve, draw, requests
     from rotorjax.trim.run import Request, numbers, table
-    from rotorjax.trim.run import run as run_trim
 
-    request = Request(
+    base = Request(
         rotor=chosen.rotor,
         thrust=chosen.thrust_coefficient,
         inflow=chosen.inflow,
-        advance=chosen.advance_ratio,
-        height=chosen.height,
         slope_deg=chosen.slope,
         climb=chosen.climb,
         tilt_deg=chosen.tilt,
         drag_area=chosen.drag_area,
         aim=chosen.aim,
     )
+    speeds, heights = chosen.advance_ratio, [None] if chosen.height is None else chosen.height
+    wanted = requests(base, speeds, heights)
+    check_picture(chosen.plot)
+    if chosen.plot is not None and len(wanted) == 1:
+        raise InputError("Argument `plot` must come with several speeds or heights, but there is one point")
+    for path in (chosen.json, chosen.plot):
+        if path is not None:
+            make_folder(path.parent)
+    free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
+    results = curve([*wanted, *free])
+    found = [numbers(result) for result in results[: len(wanted)]]
+    print("\n\n".join(table(one) for one in found))
     if chosen.json is not None:
-        make_folder(chosen.json.parent)
-    found = numbers(run_trim(request, progress=True))
-    print(table(found))
-    if chosen.json is not None:
-        write_json(chosen.json, found)
-    return 0 if found["converged"] else 1
+        write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
+    if chosen.plot is not None:
+        save_file(draw(results[: len(wanted)], results[-1] if free else None), chosen.plot)
+    return 0 if all(one["converged"] for one in found) else 1

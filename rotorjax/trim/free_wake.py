@@ -109,7 +109,9 @@ def thrust_of(loads: Loads, p: WakeTrim) -> Float[Array, ""]:
 
 
 def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
-    """β₀, β₁c, β₁s."""
+    """β₀, β₁c, β₁s; one slice alone stands for an axisymmetric motion."""
+    if flap.shape[0] == 1:
+        return jnp.concatenate([flap, jnp.zeros(2)])
     slices = flap.shape[0]
     psi = 2 * jnp.pi / slices * jnp.arange(slices)
     return jnp.stack([jnp.mean(flap), 2 * jnp.mean(flap * jnp.cos(psi)), 2 * jnp.mean(flap * jnp.sin(psi))])

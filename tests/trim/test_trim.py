@@ -146,3 +146,29 @@ def test_the_command(tmp_path, capsys, cruise, told):
 def test_the_command_says_at_once_what_cannot_be(capsys):
     assert main(["trim", "--thrust-coefficient", "0.05"]) == 2
     assert "thrust_coefficient" in capsys.readouterr().err
+
+
+def test_a_curve_over_speed(tmp_path, cruise, told):
+    """The power's bucket: less at advance ratio 0.2 than in hover; each point as if trimmed alone."""
+    file, picture = tmp_path / "curve.json", tmp_path / "curve.png"
+    flags = ["--thrust-coefficient", str(THRUST), "--advance-ratio", "0", "0.1", "0.2", "--tilt", "4"]
+    assert main(["trim", *flags, "--json", str(file), "--plot", str(picture)]) == 0
+    points = json.loads(file.read_text())["points"]
+    assert [p["advance_ratio"] for p in points] == [0, 0.1, 0.2]
+    assert points[2]["CP"] < points[0]["CP"]
+    assert points[2]["CP"] == pytest.approx(told["CP"], rel=1e-7)
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--advance-ratio", "0.1", "0.2", "--height", "1", "2"], "not both"),
+        (["--plot", "x.png"], "several"),
+        (["--plot", "x.xyz", "--height", "1", "2"], "plot"),
+        (["--height", "1", "0.2"], "height"),
+    ],
+)
+def test_bad_curves(capsys, flags, words):
+    assert main(["trim", "--thrust-coefficient", str(THRUST), *flags]) == 2
+    assert words in capsys.readouterr().err
