@@ -1,7 +1,7 @@
 """A calibration as a small TOML file, and what it does to a model.
 
 [calibration]
-set = "hayden"             # or "freewake": which parameters there are and what they mean
+set = "hayden"             # or "freewake", "wake": which parameters there are and what they mean
 model_version = 1
 rotorjax = "0.1.0"
 converged = true
@@ -26,7 +26,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax import __version__
-from rotorjax.calibration import hayden, taught
+from rotorjax.calibration import hayden, measured, taught
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_text
@@ -34,7 +34,7 @@ from rotorjax.potential.model import FiniteState, FiniteStateModel
 from rotorjax.study.finite_state import steady_state
 
 MODEL_VERSION = 1  # raised when the finite-state equations change so that fitted values no longer mean the same
-SETS: dict[str, ParameterSet] = {s.name: s for s in (hayden.PARAMETERS, taught.PARAMETERS)}
+SETS: dict[str, ParameterSet] = {s.name: s for s in (hayden.PARAMETERS, taught.PARAMETERS, measured.PARAMETERS)}
 _HEAD = ("set", "model_version", "rotorjax", "converged", "rms_error")
 
 
@@ -57,13 +57,23 @@ class Calibration:
         """The values in the order of the set."""
         return SETS[self.set].vector(self.parameters)
 
+    @property
+    def wake_settings(self) -> dict[str, float]:
+        """Settings of the free wake that it changes, by name; none where it is of the finite-state model."""
+        return dict(self.parameters) if self.set == "wake" else {}
+
     def apply(
         self, model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""] | float = 0.0
     ) -> tuple[FiniteStateModel, FiniteState]:
         """Return the calibrated model and its steady states for a loading; climb over ΩR.
 
-        Raises InputError where the calibration is for a model of other numbers of terms.
+        Raises InputError where the calibration is for a model of other numbers of terms, or for the free wake.
         """
+        if self.set == "wake":
+            raise InputError(
+                "Argument `calibration` must be of the finite-state model, but is of the free wake's settings: "
+                "`rotorjax inflow` and `rotorjax study` solve the free wake with it"
+            )
         if self.set == "hayden":
             model = eqx.tree_at(lambda m: (m.correction.b, m.correction.p), model, tuple(self.values))
             return model, steady_state(model, tau, jnp.asarray(climb, float))

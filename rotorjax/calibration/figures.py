@@ -23,6 +23,7 @@ from rotorjax.plotting import (
 if TYPE_CHECKING:
     from rotorjax.calibration.freewake_run import FreeWakeRun
     from rotorjax.calibration.hayden_run import HaydenRun
+    from rotorjax.calibration.measured_run import MeasuredRun
 
 CALIBRATED = "#CC79A7"  # of the same palette as the models' colours
 DRIVERS = {"least_squares": "least squares", "lbfgs": "L-BFGS", "adam": "Adam"}
@@ -114,3 +115,30 @@ def held_figures(result: "FreeWakeRun", folder: str | Path) -> Sequence[Path]:
     for name, path in zip(result.held, paths, strict=True):
         case_figure(result, name, path)
     return paths
+
+
+def measured_figure(result: "MeasuredRun", path: str | Path) -> None:
+    """Section lift and path of the tip vortex: measured, with the default settings and with the fitted ones."""
+    from rotorjax.calibration.measured import AGES_DEG
+    from rotorjax.validation.reference import caradonna_tung
+
+    groups = np.array(result.data.groups)
+    panels = {
+        "lift": (caradonna_tung().r, r"$r/R$", r"section lift $c_l$"),
+        "r": (AGES_DEG, "wake age, deg", r"tip vortex $r/R$"),
+        "z": (AGES_DEG, "wake age, deg", r"tip vortex $z/R$"),
+    }
+    with style():
+        figure = new_figure(10.5, 3.8)
+        for axes, (group, (places, xlabel, ylabel)) in zip(figure.subplots(1, 3), panels.items(), strict=True):
+            rows = groups == group
+            target, margin = result.data.target[rows], result.data.margin[rows]
+            axes.errorbar(places, target, margin, fmt="s", color=INK, capsize=3, label="measured, allowed range")
+            axes.plot(places, result.before[rows], "o--", color=FREE_WAKE, label="default settings")
+            axes.plot(places, result.after[rows], "o-", color=CALIBRATED, label="fitted settings")
+            axes.set(xlabel=xlabel, ylabel=ylabel, title="fitted" if result.taught[rows].all() else "held out")
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        thrust = [v[groups == "CT"][0] for v in (result.data.target, result.before, result.after)]
+        told = "fitted" if result.taught[groups == "CT"].all() else "held out"
+        figure.suptitle("$C_T$ ({}): measured {:.5f}, default {:.5f}, fitted {:.5f}".format(told, *thrust), fontsize=10)
+    save_file(figure, path)

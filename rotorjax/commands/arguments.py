@@ -58,5 +58,5 @@ def add_calibration(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         type=Path,
         metavar="FILE",
-        help="calibration.toml: the calibrated VPBFSM beside the printed one",
+        help="calibration.toml: the calibrated VPBFSM beside the printed one, or the free wake with its settings",
     )

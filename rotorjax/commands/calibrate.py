@@ -1,4 +1,4 @@
-"""`rotorjax calibrate`: fit the finite-state model to Hayden's ground effect or to the free wake."""
+"""`rotorjax calibrate`: fit the finite-state model to Hayden or to the free wake, the free wake to measurements."""
 
 import argparse
 import sys
@@ -13,8 +13,8 @@ def register(commands: argparse._SubParsersAction) -> None:
     """Add the command with its two targets."""
     parser = commands.add_parser(
         "calibrate",
-        help="fit the finite-state model to Hayden or to the free wake",
-        description="Fit parameters of the VPBFSM and write calibration.toml, calibration.json and pictures. Exit code "
+        help="fit the finite-state model to Hayden or to the free wake, the free wake to a measured rotor",
+        description="Fit parameters of a model and write calibration.toml, calibration.json and pictures. Exit code "
         "1 where the fit did not converge or a parameter ended at a bound.",
     )
     targets = parser.add_subparsers(dest="target", metavar="TARGET", required=True, parser_class=type(parser))
@@ -30,7 +30,12 @@ def register(commands: argparse._SubParsersAction) -> None:
     wake.add_argument("--parameters", metavar="NAMES", help="what to fit, by commas (all)")
     wake.add_argument("--held", nargs="*", metavar="CASE", help="cases to hold out (every second height and slope)")
     wake.set_defaults(run=run_freewake)
-    for target in (hayden, wake):
+    own = targets.add_parser("wake", help="the free wake's own settings against Caradonna and Tung's rotor at 8 deg")
+    own.add_argument("--parameters", metavar="NAMES", help="settings to fit, by commas (release)")
+    own.add_argument("--fit", metavar="NAMES", help="of CT, lift, r, z, by commas; the others are held out (CT,z)")
+    own.add_argument("--quick", action="store_true", help="coarser free wake")
+    own.set_defaults(run=run_wake)
+    for target in (hayden, wake, own):
         target.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
 
 
@@ -65,6 +70,23 @@ def run_freewake(chosen: argparse.Namespace) -> int:
         result = freewake_run.run(merged, names, chosen.held, progress=bar.show)
     print(freewake_run.report(result))
     freewake_run.write(result, chosen.out)
+    print(f"written: {chosen.out / 'calibration.toml'}")
+    return 0 if result.fit.converged else 1
+
+
+def run_wake(chosen: argparse.Namespace) -> int:
+    """Calibrate the free wake against measurements; the exit code."""
+    from rotorjax.calibration import measured_run
+    from rotorjax.io.atomic import make_folder
+
+    names = measured_run.FREE if chosen.parameters is None else names_of(chosen.parameters)
+    fitted = measured_run.FITTED if chosen.fit is None else names_of(chosen.fit)
+    measured_run.check(names, fitted)
+    make_folder(chosen.out)  # before the work, not after it
+    with _Bar("wake") as bar:
+        result = measured_run.run(names, fitted, chosen.quick, progress=bar.show)
+    print(measured_run.report(result))
+    measured_run.write(result, chosen.out)
     print(f"written: {chosen.out / 'calibration.toml'}")
     return 0 if result.fit.converged else 1
 

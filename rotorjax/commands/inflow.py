@@ -45,10 +45,11 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.study.single_output import check_picture, picture, table
 
     case = case_of(chosen)
-    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick)
+    calibration = None if chosen.calibration is None else load(chosen.calibration)
+    changes = {} if calibration is None else calibration.wake_settings
+    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, **changes)
     check_case(case, settings)
     check_picture(chosen.plot)
-    calibration = None if chosen.calibration is None else load(chosen.calibration)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
         if path is not None:  # before the work, not after it
             make_folder(path.parent)
@@ -60,7 +61,7 @@ def run(chosen: argparse.Namespace) -> int:
         data, reference = single_case(case, settings, chosen.model, progress)
     print(table(data, settings, reference))
     entry = summary_entry(data, reference)
-    if calibration is not None:
+    if calibration is not None and not changes:
         data = apply.add_calibrated(data, settings, calibration)
         print(apply.table(data, reference, calibration))
         entry |= {"calibrated": apply.entry(data, reference, calibration)}

@@ -52,7 +52,7 @@ def test_a_model_of_other_terms_is_refused():
 
 CHANGES = {
     "must be for model version 1, but is for 2": ("model_version = 1", "model_version = 2"),
-    "must be one of hayden, freewake, but is 'other'": ('set = "hayden"', 'set = "other"'),
+    "must be one of hayden, freewake, wake, but is 'other'": ('set = "hayden"', 'set = "other"'),
     r"\[parameters\] must hold mean_gain": ('set = "hayden"', 'set = "freewake"'),
     "must hold b, p, but holds b, q": ("p = ", "q = "),
     "must hold b, p, but holds b, q, p": ("p = ", "q = 1.0\np = "),
