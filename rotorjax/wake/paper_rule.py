@@ -16,11 +16,6 @@ def paper_settings(**overrides) -> WakeSettings:
     Raises InputError where a setting is out of range.
     """
     core = 0.05
-    paper: dict[str, Any] = {
-        "roll_up": "paper",
-        "inboard": (),
-        "tip_core": core,
-        "near_core": core,
-        "control_core": core,
-    }
-    return wake_settings(**paper | {"control_chords": 0.0} | overrides)
+    cores = {"tip_core": core, "near_core": core, "control_core": core}
+    paper: dict[str, Any] = {"roll_up": "paper", "inboard": (), "control_chords": 0.0, **cores}
+    return wake_settings(**{**paper, **overrides})
