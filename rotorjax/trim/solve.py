@@ -1,6 +1,6 @@
 """Solving for trim: a first guess from momentum theory and blade elements, then Newton with the exact Jacobian."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -109,6 +109,9 @@ def trim(
 ) -> Trimmed:
     """Trim a rotor. start: a trim nearby; residual: what is trimmed for, no cyclic flapping at a given tilt by default.
 
+    Where Newton fails from the first guess the thrust is raised in steps; a rotor that stalls on the way comes back
+    with `converged` False and the thrust that it reached in `why`.
+
     Raises InputError where the thrust is more than the blades can give at their greatest lift all round the disk.
     """
     residual = TrimResidual(p.rotor.blades) if residual is None else residual
@@ -120,7 +123,29 @@ def trim(
         )
     z = guess(p, flight, azimuths) if start is None else start
     outcome = newton(residual, z, flight, p, tol=TOL, measure=largest, progress=progress)
-    return Trimmed(outcome.x, outcome, residual)
+    found = Trimmed(outcome.x, outcome, residual)
+    return found if outcome.converged or start is not None else _raised(found, p, flight, azimuths)
+
+
+def _raised(failed: Trimmed, p: CoupledRotor, flight: Flight, azimuths: int) -> Trimmed:
+    """Raise the thrust in steps to the wanted one, each trim from the last; if that fails, say how far it came."""
+    wanted, reached, z = float(flight.thrust), 0.0, None
+    step = wanted / 2
+    while step > 0.01 * wanted:
+        target = min(wanted, reached + step)
+        condition = eqx.tree_at(lambda f: f.thrust, flight, jnp.asarray(target))
+        near = guess(p, condition, azimuths) if z is None else z
+        outcome = newton(failed.residual, near, condition, p, tol=TOL, measure=largest)
+        if not outcome.converged:
+            step /= 2
+            continue
+        reached, z = target, outcome.x
+        if reached == wanted:
+            return Trimmed(z, outcome, failed.residual)
+    why = (
+        f"out of reach: raised in steps, the rotor trims up to C_T = {reached:.4g}; at {wanted:g}: {failed.outcome.why}"
+    )
+    return replace(failed, outcome=replace(failed.outcome, why=why))
 
 
 @eqx.filter_jit

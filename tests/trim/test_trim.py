@@ -74,6 +74,14 @@ def test_a_revolution_marched_from_the_trim_ends_where_it_began(cruise):
     assert float(jnp.ptp(whole.flap[:, 3])) > 1e-4  # the differential coordinate does move
 
 
+def test_a_thrust_beyond_stall_names_the_limit():
+    """Below the bound that is refused at once, but more than the retreating blade can carry."""
+    found = run(Request("uh60", 0.012, "pitt-peters", 0.2, tilt_deg=4.0)).trimmed.outcome
+    assert not found.converged
+    limit = float(found.why.split("C_T = ")[1].split(";")[0])
+    assert 0.008 < limit < 0.012
+
+
 def test_outputs_are_those_of_equal_blades(cruise):
     """Every node sees all blades; blade b at node k stands at ψ_k + 2πb/B: one curve over the azimuth."""
     out = outputs_at(cruise.z, cruise.flight, cruise.p)
