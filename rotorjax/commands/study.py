@@ -4,7 +4,7 @@ import argparse
 import time
 from pathlib import Path
 
-from rotorjax.commands.arguments import add_harmonics, add_rotor
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -22,11 +22,13 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--slopes", nargs="*", type=float, metavar="DEG", help="slopes at h = 1, in degrees")
     add_rotor(parser)
     add_harmonics(parser)
+    add_calibration(parser)
     parser.set_defaults(run=run)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Run the study; the exit code."""
+    from rotorjax.calibration.calibration_file import load
     from rotorjax.study.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
     from rotorjax.study.output import write_all
     from rotorjax.study.run import solve_cases
@@ -36,11 +38,15 @@ def run(chosen: argparse.Namespace) -> int:
     heights = (QUICK_HEIGHTS if chosen.quick else HEIGHTS) if chosen.heights is None else chosen.heights
     slopes = (QUICK_SLOPES_DEG if chosen.quick else SLOPES_DEG) if chosen.slopes is None else chosen.slopes
     cases = study_cases(heights, slopes)
-    settings = study_settings(chosen.rotor, chosen.collective, harmonics=chosen.harmonics, quick=chosen.quick)
+    calibration = None if chosen.calibration is None else load(chosen.calibration)
+    changes = {} if calibration is None else calibration.wake_settings
+    settings = study_settings(
+        chosen.rotor, chosen.collective, harmonics=chosen.harmonics, quick=chosen.quick, **changes
+    )
     result = solve_cases(cases, settings, chosen.out)
     # a PDF's fonts take longer than its picture, and a first look needs none
     formats = ("png",) if chosen.quick else ("png", "pdf")
-    write_all(result.cases, settings, chosen.out, started, formats)
+    write_all(result.cases, settings, chosen.out, started, formats, None if changes else calibration)
     print(f"{len(result.cases)} cases in {time.perf_counter() - started:.0f} s: {chosen.out / 'report.md'}")
     if result.diverged:
         print("not converged: " + ", ".join(result.diverged))

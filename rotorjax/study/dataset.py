@@ -84,7 +84,7 @@ def terms_study(data: xr.Dataset, settings: StudySettings) -> dict[str, xr.Varia
 
 def _uniform(data: xr.Dataset, count: int, reference: float) -> xr.Dataset:
     """One case on `count` azimuths, without the wake's state, with its differences."""
-    for model in ("vpbfsm", "exact_image"):
+    for model in ("vpbfsm", "exact_image", *(["calibrated"] if "calibrated_inflow" in data else [])):
         value = inflow_rms_difference(data, reference, model)
         about = f"rms difference of the {model} inflow and the free wake's, 0.25 <= r/R <= 0.95, both over the OGE mean"
         data = data.assign(

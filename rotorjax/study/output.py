@@ -7,6 +7,8 @@ from typing import Any
 
 import xarray as xr
 
+from rotorjax.calibration import apply
+from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.study.dataset import combine, reference_inflow
@@ -23,31 +25,44 @@ def write_all(
     folder: str | Path,
     started: float,
     formats: Sequence[str] = ("png", "pdf"),
+    calibration: Calibration | None = None,
 ) -> xr.Dataset:
     """Write every result of a study into a folder and return the merged data set.
 
-    started: time.perf_counter() at the beginning of this run. formats: of the figures. Raises InputError where the
-    folder cannot be written.
+    started: time.perf_counter() at the beginning of this run. formats: of the figures. calibration: of the VPBFSM; the
+    calibrated model stands beside the printed one in every file. Raises InputError where the folder cannot be written
+    or the calibration is for another model.
     """
     folder = Path(folder)
+    if calibration is not None:
+        cases = [apply.add_calibrated(d, settings, calibration) if "vpbfsm_tau" in d else d for d in cases]
     merged = combine(cases, settings)
     netcdf.write(folder / "cases.nc", merged)
     drawn, missing = draw_all(merged, folder, formats)
     wall = time.perf_counter() - started
     write_text(folder / "report.md", report(merged, drawn, missing, wall))
-    write_json(folder / "summary.json", summary(cases, settings, wall))
+    write_json(folder / "summary.json", summary(cases, settings, wall, calibration))
     return merged
 
 
-def summary(cases: Sequence[xr.Dataset], settings: StudySettings, wall_time_s: float) -> dict[str, Any]:
+def summary(
+    cases: Sequence[xr.Dataset], settings: StudySettings, wall_time_s: float, calibration: Calibration | None = None
+) -> dict[str, Any]:
     """Content of summary.json; wall_time_s: of this run, which may have found finished cases."""
     reference = reference_inflow(cases)
+
+    def entry(data: xr.Dataset) -> dict[str, Any]:
+        found = summary_entry(data, reference)
+        if calibration is not None and "calibrated_inflow" in data:
+            found |= {"calibrated": apply.entry(data, reference, calibration)}
+        return found
+
     return {
         "rotor": settings.rotor.name,
         "collective_deg": round(settings.collective_deg, 9),
         "fingerprint": settings.fingerprint(),
         "mean_inflow_oge": reference,
-        "cases": [summary_entry(data, reference) for data in cases],
+        "cases": [entry(data) for data in cases],
         "exact_image_inflow_rms_difference": {
             case_of(data).name: inflow_rms_difference(data, reference, "exact_image") for data in cases
         },

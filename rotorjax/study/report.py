@@ -26,6 +26,7 @@ def report(merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wal
         "# Rotor inflow in ground effect: free vortex wake and VPBFSM",
         _introduction(merged, wall_time_s),
         "## Cases\n\n" + _case_table(reading),
+        *(["## Calibrated model\n\n" + _calibrated(reading)] if "calibrated_inflow" in merged else []),
         "## What both models must show\n\n" + _claim_table(checks(reading)),
         "## The paper's claims\n\n" + _claim_table(paper_claims(reading)),
         "## Where the two models part, and why\n\n" + where_they_part(reading),
@@ -83,6 +84,17 @@ def _case_table(reading: Reading) -> str:
         "0.25 ≤ r̄ ≤ 0.95, both inflows over the OGE mean."
     )
     return table(head, rows) + note
+
+
+def _calibrated(reading: Reading) -> str:
+    """Inflow of the calibrated VPBFSM beside the printed one's."""
+    names = ["free_wake_mean_inflow", "vpbfsm_mean_inflow", "calibrated_mean_inflow"]
+    names += ["vpbfsm_inflow_rms_difference", "calibrated_inflow_rms_difference"]
+    rows = [(c.label, *(reading.number(c, n) for n in names)) for c in present(reading.merged) if reading.has(c)]
+    head = ["case", "free wake: mean/ΩR", "VPBFSM: mean/ΩR", "calibrated: mean/ΩR"]
+    head += ["rms difference, printed factor", "rms difference, calibrated"]
+    mean = [float(np.mean(v)) for v in zip(*(row[4:] for row in rows), strict=True)]
+    return table(head, [*rows, ("mean", *[""] * 3, *mean)])
 
 
 def _claim_table(claims: Sequence[Claim]) -> str:

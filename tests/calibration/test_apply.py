@@ -11,6 +11,9 @@ from rotorjax.calibration.calibration_file import Calibration, save
 from rotorjax.cli import main
 from rotorjax.errors import InputError
 from rotorjax.study.cases import Case
+from rotorjax.study.dataset import combine
+from rotorjax.study.output import summary
+from rotorjax.study.report import report
 from rotorjax.study.settings import study_settings
 from rotorjax.study.single import single_case
 
@@ -74,3 +77,16 @@ def test_a_file_that_is_no_calibration_is_refused_before_the_work(tmp_path, caps
     (tmp_path / "a.toml").write_text("[other]\n")
     assert main(["inflow", "--height", "1", "--calibration", str(tmp_path / "a.toml")]) == 2
     assert "must hold [calibration] and [parameters]" in capsys.readouterr().err
+
+
+def test_a_study_holds_the_calibrated_model_beside_the_printed_one(solved, settings):
+    cases = [apply.add_calibrated(solved[0], settings, PRINTED["hayden"])]
+    found = summary(cases, settings, 1.0, PRINTED["hayden"])["cases"][0]["calibrated"]
+    assert found["set"] == "hayden"
+    assert found["mean_inflow"] == pytest.approx(float(solved[0]["vpbfsm_mean_inflow"]), rel=1e-12)
+    merged = combine(cases, settings).assign(reference_inflow=0.05)
+    np.testing.assert_allclose(merged["calibrated_inflow"], merged["vpbfsm_inflow"], rtol=1e-12)
+    assert "calibrated_inflow_rms_difference" in merged
+    text = report(merged, [], [], 1.0)
+    assert "## Calibrated model" in text
+    assert "calibrated: mean/ΩR" in text
