@@ -110,7 +110,7 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 
 
 def _free(subject: Subject) -> tuple[Point, ...]:
-    return subject.hovers(point("uh60"))
+    return subject.hovers(point("caradonna_tung", 8.0) if subject.quick else point("uh60"))
 
 
 KNOWN = (

@@ -26,7 +26,8 @@ POWER = Against(
 LOWEST, HIGHEST = 0.002, 0.010
 """C_T between which momentum theory is asked for."""
 SWEEP = {"uh60": (18.0, 16.0, 14.0, 13.25, 20.0, 22.0), "caradonna_tung": (8.0, 5.0, 11.0, 13.0)}
-QUICK = {"uh60": (18.0, 15.0, 21.0), "caradonna_tung": (8.0,)}
+QUICK = {"caradonna_tung": (8.0, 6.0, 10.0)}
+"""One rotor for all quick cases: another number of blades is compiled anew."""
 
 
 class Ratios(NamedTuple):
@@ -39,7 +40,7 @@ class Ratios(NamedTuple):
 
 
 def points(subject: Subject) -> tuple[Point, ...]:
-    """Collectives of the UH-60, twisted, and of Caradonna and Tung's rotor, untwisted."""
+    """Collectives of the UH-60, twisted, and of Caradonna and Tung's rotor, untwisted; quick: of the latter."""
     sweep = QUICK if subject.quick else SWEEP
     return subject.hovers(*(point(rotor, c) for rotor, collectives in sweep.items() for c in collectives))
 

@@ -30,7 +30,7 @@ def test_one_case_writes_everything(tmp_path, solver, capsys):
     verdicts = [row["verdict"] for row in found["rows"]]
     assert found["out"] == verdicts.count("out") > 0
     assert found["met"] + found["out"] == len(verdicts)
-    assert {wake["rotor"] for wake in found["wakes"]} == {"uh60", "caradonna_tung"}
+    assert {wake["rotor"] for wake in found["wakes"]} == {"caradonna_tung"}  # one rotor, few programs to compile
     assert found["settings"]["wake.panels"] == 12
     text = (out / "validation.md").read_text()
     assert f"{found['met']} of {len(verdicts)} rows are met" in text
