@@ -24,6 +24,13 @@ def register(commands: argparse._SubParsersAction) -> None:
         "--outputs", metavar="NAMES", default="CT,lambda0", help="by commas: CT, CQ, lambda0, inflow (CT,lambda0)"
     )
     parser.add_argument("--order", type=int, default=20, metavar="N", help="states of the reduced model (20)")
+    parser.add_argument(
+        "--harmonics",
+        type=int,
+        default=0,
+        metavar="K",
+        help="over a slope: harmonics of a blade's passage in the time-invariant model (0: averaging)",
+    )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
     parser.add_argument("--quick", action="store_true", help="coarser free wake")
     parser.set_defaults(run=run)
@@ -45,14 +52,14 @@ def run(chosen: argparse.Namespace) -> int:
     check_case(case, settings)
     model = model_of(case, settings)
     names = names_of(chosen.inputs), names_of(chosen.outputs)
-    check(model, *names, chosen.order)
+    check(model, *names, chosen.order, chosen.harmonics)
     out = make_folder(chosen.out)  # before the work, not after it
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
 
         def progress(stage: str, residual: float) -> None:
             bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
 
-        found = linearise_case(model, *names, chosen.order, progress)
+        found = linearise_case(model, *names, chosen.order, progress, harmonics=chosen.harmonics)
     if not isinstance(found, Linearised):
         write_json(out / "linearise.json", {"orbit": output.orbit(found)})
         print(f"{case.label}: not converged: {found.why}")

@@ -15,6 +15,18 @@ MOST = 4
 NAMES = {"CT": r"$C_T$", "CQ": r"$C_Q$", "lambda0": r"$\lambda_0$"}
 
 
+def residuals(history: Sequence[float], tol: float) -> Figure:
+    """Residual of every iterate on the way to the periodic wake, all steps of the continuation in a row."""
+    with style():
+        figure = new_figure(6.4, 3.8)
+        axes = figure.subplots()
+        axes.semilogy(np.maximum(history, 1e-17), "o-", color=FREE_WAKE, ms=3, lw=1)
+        axes.axhline(tol, color=INK, lw=0.8, ls=":")
+        axes.annotate("tolerance", (0, tol), xytext=(0, 3), textcoords="offset points", va="bottom")
+        axes.set(xlabel="iterate, over all steps of the continuation", ylabel="residual, relative rms")
+    return figure
+
+
 def stability(spectrum: Spectrum) -> Figure:
     """Exponents by wave number with the pairing rate, and the multipliers over a revolution with the unit circle."""
     with style():

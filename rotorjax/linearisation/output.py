@@ -10,7 +10,7 @@ from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.marching import STEPS
 from rotorjax.linearisation.reduce import HIGHEST
-from rotorjax.linearisation.run import Linearised
+from rotorjax.linearisation.run import TOL, Linearised
 from rotorjax.ode.export import save_mat, save_netcdf
 from rotorjax.study.markdown import table
 from rotorjax.wake.solution import Solution
@@ -27,6 +27,7 @@ def write(found: Linearised, title: str, folder: str | Path) -> dict[str, Any]:
     for name, model in models.items():
         save_netcdf(model, folder / f"{name}.nc")
         save_mat(model, folder / f"{name}.mat")
+    plotting.save(figures.residuals(found.solution.residuals, TOL), folder / "residuals")
     plotting.save(figures.bode(found.full, small.frequency.model, HIGHEST), folder / "bode")
     plotting.save(figures.steps(found.full, small.time.model, found.marched, STEPS), folder / "steps")
     if found.spectrum is not None:
@@ -45,6 +46,7 @@ def orbit(solution: Solution, at_rest: float | None = None) -> dict[str, Any]:
         "residual": solution.residual,
         "rhs_residual": at_rest,
         "iterations": solution.iterations,
+        "residuals": list(solution.residuals),
         "wall_time_s": solution.wall_time_s,
         "compile_time_s": solution.compile_time_s,
         "CT": solution.CT,
@@ -66,6 +68,7 @@ def summary(found: Linearised) -> dict[str, Any]:
         "inputs": dict(zip(full.inputs, full.input_units, strict=True)),
         "outputs": dict(zip(full.outputs, full.output_units, strict=True)),
         "full_order": full.order,
+        "harmonics": list(found.harmonics),
         "full_unstable_modes": small.unstable,
         "reduced_order": small.frequency.model.order,
         "reduction": small.frequency.method,
@@ -137,15 +140,17 @@ def _orbit(content: dict[str, Any]) -> str:
         f"C_T = {o['CT']:.6f}, C_Q = {o['CQ']:.7f}, λ₀ = {o['lambda0']:.5f}. {o['iterations']} Newton iterations in "
         f"{o['wall_time_s']:.1f} s ({o['compile_time_s']:.1f} s of them compiling); one more pass moves the wake by "
         f"{o['residual']:.1e} R (rms). The rate of change of the state, as marched in time, is {o['rhs_residual']:.1e} "
-        "of the state (rms)."
+        "of the state (rms). Each rise of the residual below is a step of the continuation.\n\n"
+        "![Residuals](residuals.png)"
     )
 
 
 def _models(found: Linearised, content: dict[str, Any]) -> str:
     small, slope = found.small, found.spectrum is None
     kind = (
-        f"All blades alike, A, B, C, D at {found.periodic.t.size} azimuths of a passage (full.nc, full.mat), averaged "
-        "below."
+        f"All blades alike: {found.periodic.order} states with A, B, C, D at {found.periodic.t.size} azimuths of a "
+        "passage (full.nc, full.mat). Time-invariant below by "
+        + ("averaging." if len(found.harmonics) == 1 else f"harmonics {found.harmonics} of the passage.")
         if slope
         else "Constant in the blades' frames; axisymmetric disturbances are all that these inputs and outputs meet."
     )
@@ -157,7 +162,7 @@ def _models(found: Linearised, content: dict[str, Any]) -> str:
         else f"{small.frequency.model.order} states cannot hold {small.unstable} unstable modes and a response beside "
         "them, so there are two reduced models: reduced_frequency (.nc, .mat) for steady frequencies, which must not "
         "be marched in time, and reduced_time (.nc, .mat) for marching, which is wrong at steady "
-        f"frequencies. `--order {small.unstable + 20}` or so gives one model that is right in both."
+        f"frequencies. `--order {small.unstable + 40}` or so gives one model that is right in both."
     )
     return (
         f"## Models\n\nFull model: {content['full_order']} states, {small.unstable} unstable modes. {kind}\n\n"

@@ -12,9 +12,9 @@ from rotorjax.linearisation import figures
 from rotorjax.linearisation.assembly import assemble
 from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step, stable_steps
 from rotorjax.linearisation.reduce import Pair, reduce
-from rotorjax.linearisation.system import check_names, linear_wake, order_of, residual_of
+from rotorjax.linearisation.system import NODES, check_names, linear_wake, order_of, residual_of
 from rotorjax.linearisation.waves import Spectrum, spectrum
-from rotorjax.ode.harmonic import average
+from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.models import LinearModel, PeriodicModel
 from rotorjax.study.cases import Case
 from rotorjax.study.settings import StudySettings
@@ -31,14 +31,16 @@ TOL = 1e-9
 class Linearised:
     """Everything found about one case.
 
-    at_rest: relative rms of `dynamics.rhs` at the solution. periodic, full, small: the models. spectrum: None over a
-    slope. marched: nonlinear responses by input. march_error (q, m): largest difference between linear and nonlinear
-    step over a revolution, over the largest response. seconds: wall time by stage.
+    at_rest: relative rms of `dynamics.rhs` at the solution. periodic, full, small: the models, `full` being the
+    time-invariant one of the `harmonics` of a blade's passage. spectrum: None over a slope. marched: nonlinear
+    responses by input. march_error (q, m): largest difference between linear and nonlinear step over a revolution, over
+    the largest response. seconds: wall time by stage.
     """
 
     solution: Solution
     at_rest: float
     periodic: PeriodicModel
+    harmonics: tuple[int, ...]
     full: LinearModel
     small: Pair
     spectrum: Spectrum | None
@@ -53,11 +55,20 @@ def model_of(case: Case, settings: StudySettings) -> FreeWake:
     return free_wake(settings.rotor, settings.operating, case.ground, settings.wake)
 
 
-def check(model: FreeWake, inputs: tuple[str, ...], outputs: tuple[str, ...], order: int) -> None:
-    """Raise InputError for unknown names or an order that the model does not have, before anything is solved."""
+def check(model: FreeWake, inputs: tuple[str, ...], outputs: tuple[str, ...], order: int, harmonics: int = 0) -> None:
+    """Raise InputError for unknown names, an order that the model does not have, or harmonics of what does not change,
+    before anything is solved.
+    """
     check_names(model, inputs, outputs)
-    if not 1 <= order <= order_of(model):
-        raise InputError(f"Argument `order` must lie in [1, {order_of(model)}], the states of a blade, but is {order}")
+    tilted = model.ground is not None and float(model.ground.slope) != 0
+    if harmonics < 0 or (harmonics > 0 and not tilted):
+        raise InputError(
+            f"Argument `harmonics` must be 0 where the wake does not change with azimuth (level ground or none) and at "
+            f"least 0 over a slope, but is {harmonics}"
+        )
+    most = order_of(model) * (1 + 2 * harmonics)
+    if not 1 <= order <= most:
+        raise InputError(f"Argument `order` must lie in [1, {most}], the states of a blade, but is {order}")
 
 
 def linearise_case(
@@ -67,13 +78,15 @@ def linearise_case(
     order: int,
     progress: Progress | None = None,
     *,
+    harmonics: int = 0,
     solver: Callable[..., Solution] | None = None,
 ) -> Linearised | Solution:
     """Solve and linearise a case; a solution that did not converge is returned as it is.
 
-    progress(stage, residual) is called as things go on. Raises InputError as `check` does.
+    harmonics: of a blade's passage over a slope that the time-invariant model holds, 0 for averaging. progress(stage,
+    residual) is called as things go on. Raises InputError as `check` does.
     """
-    check(model, inputs, outputs, order)
+    check(model, inputs, outputs, order, harmonics)
     clock, stages = Clock(), _Stages(progress)
     found = (solver or solution.solve)(model, None, progress, TOL)
     stages.done("orbit")
@@ -81,9 +94,10 @@ def linearise_case(
         return found
     parts = assemble(found) if found.psi.size == 1 else None
     at_rest = residual_of(found, parts)
-    periodic = linear_wake(found, inputs, outputs, parts=parts)
+    periodic = linear_wake(found, inputs, outputs, parts=parts, nodes=max(NODES, 4 * harmonics + 1))
     stages.done("linearisation")
-    full = average(periodic)
+    kept = tuple(range(harmonics + 1))
+    full = harmonic_model(periodic, kept)
     waves = None if parts is None else spectrum(found, parts=parts)
     stages.done("spectrum")
     small = reduce(full, order)
@@ -92,7 +106,8 @@ def linearise_case(
     marched = {name: nonlinear_step(found, name, steps=steps) for name in full.inputs}
     error = march_error(full, marched)
     stages.done("marches")
-    return Linearised(found, at_rest, periodic, full, small, waves, marched, error, stages.seconds, clock.read()[1])
+    seconds = stages.seconds
+    return Linearised(found, at_rest, periodic, kept, full, small, waves, marched, error, seconds, clock.read()[1])
 
 
 def march_error(full: LinearModel, marched: dict[str, Response]) -> Float[np.ndarray, "q m"]:

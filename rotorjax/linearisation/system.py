@@ -74,17 +74,18 @@ def _moved(t: Array, x: WakeState, base: Base) -> tuple[WakeState, WakeState]:
     return jax.tree.map(lambda a, d: a + d, state, x), rate
 
 
-def _disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeState:
+def disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeState:
     """Rate of a disturbance of the wake over a slope: one slice for all blades alike, or B."""
     state, own = _moved(t, x, base)
     change = jax.tree.map(jnp.subtract, rhs(t, state, u, base.model), own)
     return change if slices(x) > 1 else jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), change)
 
 
-_compiled = eqx.filter_jit(_disturbed_rhs)
+_compiled = eqx.filter_jit(disturbed_rhs)
 
 
-def _disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeOutputs:
+def disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeOutputs:
+    """Outputs of the wake with a disturbance, shaped as for `disturbed_rhs`."""
     return outputs(t, _moved(t, x, base)[0], u, base.model)
 
 
@@ -102,10 +103,10 @@ def residual_of(solution: Solution, parts: Assembly | None = None) -> float:
     return relative_rms(np.concatenate(rates), _flat(state))
 
 
-def orbit_of(solution: Solution, blades: Blades = "alike") -> Orbit:
+def orbit_of(solution: Solution, blades: Blades = "alike", nodes: int = NODES) -> Orbit:
     """The periodic wake as the orbit that is linearised about.
 
-    Axisymmetric: the constant state. Over a slope: disturbances from the solution, which are zero.
+    Axisymmetric: the constant state. Over a slope: disturbances from the solution, which are zero, at `nodes` azimuths.
     """
     model, state = solution.model, solution.state
     found = Outcome(
@@ -120,7 +121,7 @@ def orbit_of(solution: Solution, blades: Blades = "alike") -> Orbit:
     if slices(state) == 1 and blades == "alike":
         return make_orbit(0.0, jax.tree.map(lambda a: jnp.asarray(a)[None], state), 2 * np.pi, found)
     count = 1 if blades == "alike" else model.rotor.blades
-    nodes = 1 if slices(state) == 1 else NODES
+    nodes = 1 if slices(state) == 1 else nodes
     zero = jax.tree.map(lambda a: jnp.zeros((nodes, count, *a.shape[1:])), state)
     return make_orbit(0.0, zero, 2 * np.pi / model.rotor.blades, found)
 
@@ -131,6 +132,7 @@ def linear_wake(
     outputs_: tuple[str, ...] | None = None,
     *,
     blades: Blades = "alike",
+    nodes: int = NODES,
     chunk: int = 64,
     progress: bool = False,
     parts: Assembly | None = None,
@@ -139,11 +141,11 @@ def linear_wake(
 
     inputs: of `WakeInputs` (collective, climb, height over ground); outputs_: of `WakeOutputs`. None takes all. One
     time where the wake is axisymmetric, put together from `parts` (`assemble(solution)`, made here by default); over a
-    slope NODES times in a passage 2π/B, by forward mode.
+    slope `nodes` times in a passage 2π/B, by forward mode.
 
     Raises InputError where the solution has not converged or a name is unknown.
     """
-    orbit, u = orbit_of(solution, blades), inputs_of(solution.model)
+    orbit, u = orbit_of(solution, blades, nodes), inputs_of(solution.model)
     chosen = {"inputs": inputs, "outputs": outputs_, "units": UNITS, "chunk": chunk, "progress": progress}
     if slices(solution.state) == 1 and blades == "alike":
         if orbit.converged and parts is None:
@@ -154,7 +156,7 @@ def linear_wake(
             return parts.value, np.concatenate([parts.jacobian(), parts.by_input], axis=1)
 
         return linearise(rhs, outputs, orbit, u, solution.model, **chosen, derivative=derivative)
-    return linearise(_disturbed_rhs, _disturbed_outputs, orbit, u, Base(solution.state, solution.model), **chosen)
+    return linearise(disturbed_rhs, disturbed_outputs, orbit, u, Base(solution.state, solution.model), **chosen)
 
 
 def order_of(model: FreeWake) -> int:

@@ -37,10 +37,14 @@ def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int) -> HarmonicInver
     """Make the preconditioner for K slices from an axisymmetric wake (K = 1) over level ground or none."""
     blades = model.rotor.blades
     found = evaluated(model, x)
-    half = [velocity_response(model, found.state, jnp.asarray(2 * np.pi * q / blades)) for q in range(blades // 2 + 1)]
     # the derivative is real, so that of −q is the conjugate of that of q
-    whole = [half[q] if q < len(half) else jnp.conj(half[blades - q]) for q in range(blades)]
-    matrix = _jacobian(model, x, found, jnp.stack([whole[p % blades] for p in range(slices // 2 + 1)]), slices)
+    waves = [p % blades for p in range(slices // 2 + 1)]
+    half = {
+        q: velocity_response(model, found.state, jnp.asarray(2 * np.pi * q / blades))
+        for q in sorted({min(p, blades - p) for p in waves})
+    }
+    responses = jnp.stack([half[p] if p in half else jnp.conj(half[blades - p]) for p in waves])
+    matrix = _jacobian(model, x, found, responses, slices)
     return HarmonicInverse(jnp.linalg.inv(matrix))
 
 

@@ -1,4 +1,4 @@
-"""`rotorjax linearise` end to end on a tiny wake; bad input."""
+"""`rotorjax linearise` end to end on a coarse wake; bad input."""
 
 import json
 from dataclasses import replace
@@ -7,18 +7,17 @@ import matplotlib.image
 import numpy as np
 import pytest
 import scipy.io
+from wakes import COARSE, made_up
 
 from rotorjax.cli import main
 from rotorjax.io import netcdf
 from rotorjax.wake import solution
 from rotorjax.wake.settings import wake_settings
 
-TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "free_turns": 2.0, "closure_turns": 2}
-
 
 @pytest.fixture(autouse=True)
-def tiny(monkeypatch):
-    monkeypatch.setattr("rotorjax.study.settings.quick_settings", lambda **more: wake_settings(**TINY | more))
+def coarse(monkeypatch):
+    monkeypatch.setattr("rotorjax.study.settings.quick_settings", lambda **more: wake_settings(**COARSE | more))
 
 
 @pytest.mark.slow
@@ -26,7 +25,7 @@ def test_it_writes_everything(tmp_path, capsys):
     out = tmp_path / "out"
     names = ["--inputs", "collective,height", "--outputs", "CT,lambda0"]
     assert main(["linearise", "--quick", "--height", "1", *names, "--order", "40", "--out", str(out)]) == 0
-    pictures = {f"{name}.{ending}" for name in ("bode", "steps", "stability") for ending in ("png", "pdf")}
+    pictures = {f"{name}.{ending}" for name in ("residuals", "bode", "steps", "stability") for ending in ("png", "pdf")}
     models = {f"{name}.{end}" for name in ("full", "reduced_frequency", "reduced_time") for end in ("nc", "mat")}
     assert {path.name for path in out.iterdir()} == pictures | models | {"linearise.json", "report.md"}
     found = json.loads((out / "linearise.json").read_text())
@@ -47,8 +46,6 @@ def test_it_writes_everything(tmp_path, capsys):
 
 
 def test_a_wake_that_is_lost_gives_exit_code_1(tmp_path, monkeypatch, capsys):
-    from wakes import made_up
-
     def lost(model, start, progress, tol):
         return replace(made_up(model), converged=False, why="made up to fail")
 
@@ -65,6 +62,8 @@ BAD = {
     "--outputs CX": "'CX'",
     "--order 0": "but is 0",
     "--order 100000": "but is 100000",
+    "--harmonics 1": "`harmonics` must be 0 where the wake does not change",
+    "--height 1 --slope 5 --harmonics -1": "but is -1",
     "--slope 5": "`height` must be given",
     "--height 1 --climb 0.01": "`climb` must be 0 over ground",
     "--order x": "invalid int value: 'x'",

@@ -1,13 +1,12 @@
 """A coarse UH-60 wake that compiles and solves in seconds."""
 
 import pytest
+from wakes import COARSE
 
 from rotorjax.rotor.catalogue import load
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.solution import solve
-
-COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 3.0, "closure_turns": 3}
 
 
 @pytest.fixture(scope="session")

@@ -14,10 +14,8 @@ from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.performance import performance
 from rotorjax.wake.sensitivity import periodic_wake
-from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.solution import solve
 
-TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "free_turns": 2.0, "closure_turns": 2}
 PARAMETERS = {
     "collective": lambda m: m.operating.collective,
     "height": lambda m: m.ground.height,
@@ -27,9 +25,8 @@ PARAMETERS = {
 
 
 @pytest.fixture(scope="module")
-def grounded(uh60):
-    """The wake of the linear models' tests: its programs are compiled once for both."""
-    return solve(free_wake(*uh60, plane(1.0), wake_settings(**TINY, azimuths=4)), tol=1e-11)
+def grounded(uh60, coarse):
+    return solve(free_wake(*uh60, plane(1.0), coarse), tol=1e-11)
 
 
 def moved(model, where, step):
