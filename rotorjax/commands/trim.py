@@ -20,7 +20,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     add("--height", type=float, nargs="+", metavar="H", help="hub over ground, over R (none: out of ground effect)")
     add("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     add("--climb", type=float, default=0.0, metavar="V", help="vertical speed over ΩR (0)")
-    add("--inflow", default="pitt-peters", metavar="MODEL", help="uniform, pitt-peters (default) or vpbfsm")
+    add("--inflow", default="pitt-peters", metavar="MODEL", help="uniform, pitt-peters (default), vpbfsm or freewake")
     add("--for", dest="aim", choices=("flapping", "moments"), default="flapping", help="what cyclic pitch takes away")
     shaft = parser.add_mutually_exclusive_group()
     shaft.add_argument("--tilt", type=float, default=0.0, metavar="DEG", help="shaft forward (0)")
@@ -39,7 +39,8 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.plotting import save_file
     from rotorjax.study.single_output import check_picture
     from rotorjax.trim.curve import curve, draw, requests
-    from rotorjax.trim.run import Request, numbers, table
+    from rotorjax.trim.dispatch import numbers_of
+    from rotorjax.trim.run import Request, table
 
     base = Request(
         rotor=chosen.rotor,
@@ -61,7 +62,7 @@ def run(chosen: argparse.Namespace) -> int:
             make_folder(path.parent)
     free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
     results = curve([*wanted, *free])
-    found = [numbers(result) for result in results[: len(wanted)]]
+    found = [numbers_of(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))
     if chosen.json is not None:
         write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})

@@ -12,7 +12,9 @@ from tqdm import tqdm
 from rotorjax import plotting
 from rotorjax.calibration.hayden import hayden_factor
 from rotorjax.errors import InputError
-from rotorjax.trim.run import Request, Result, numbers, prepare, run
+from rotorjax.trim.dispatch import check_request, numbers_of, trim_request
+from rotorjax.trim.in_wake_run import WakeResult
+from rotorjax.trim.run import Request, Result
 
 _PARTS = {"CP_induced": "induced", "CP_profile": "profile", "CP_parasite": "parasite"}
 
@@ -26,27 +28,33 @@ def requests(base: Request, speeds: Sequence[float], heights: Sequence[float | N
         )
     found = [replace(base, advance=mu, height=h) for mu in speeds for h in heights]
     for request in found:
-        prepare(request)  # what cannot be had is refused before the first trim
+        check_request(request)  # what cannot be had is refused before the first trim
     return found
 
 
-def curve(wanted: Sequence[Request], progress: bool = True) -> list[Result]:
+def curve(wanted: Sequence[Request], progress: bool = True) -> list[Result | WakeResult]:
     """Trims in order; each starts from the last one that converged."""
-    found: list[Result] = []
+    found: list[Result | WakeResult] = []
     last = None
-    for request in tqdm(wanted, desc="trim", unit="point", disable=not progress, file=sys.stderr):
-        near = last if last is not None and (last.request.height is None) == (request.height is None) else None
-        result = run(request, None if near is None else near.z)
-        if near is not None and not result.trimmed.outcome.converged:
-            result = run(request)
-        last = result if result.trimmed.outcome.converged else last
-        found.append(result)
+    with tqdm(wanted, desc="trim", unit="point", disable=not progress, file=sys.stderr) as bar:
+
+        def show(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}")
+
+        for request in bar:
+            near = last if last is not None and (last.request.height is None) == (request.height is None) else None
+            result = trim_request(request, None if near is None else near.z, show)
+            if near is not None and not result.trimmed.outcome.converged:
+                result = trim_request(request, None, show)
+            if isinstance(result, Result) and result.trimmed.outcome.converged:
+                last = result
+            found.append(result)
     return found
 
 
-def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure:
+def draw(found: Sequence[Result | WakeResult], out_of_ground: Result | WakeResult | None = None) -> Figure:
     """Power and its parts, and controls, over speed or height; over height beside Hayden's where OGE is given."""
-    rows = [numbers(result) for result in found]
+    rows = [numbers_of(result) for result in found]
     rows = [row for row in rows if row["converged"]]
     over_height = len({row["height"] for row in rows}) > 1
     x = np.array([row["height"] if over_height else row["advance_ratio"] for row in rows], float)
@@ -54,7 +62,7 @@ def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure
         figure = plotting.new_figure(9.0, 3.8)
         power, controls = figure.subplots(1, 2)
         if over_height and out_of_ground is not None:
-            _in_ground_effect(power, x, rows, numbers(out_of_ground))
+            _in_ground_effect(power, x, rows, numbers_of(out_of_ground))
         else:
             power.plot(x, [row["CP"] for row in rows], color=plotting.INK, marker="o", label="power")
             for key, line in zip(_PARTS, ("--", ":", "-."), strict=True):

@@ -53,9 +53,8 @@ class Result:
         return self.trimmed.z
 
 
-def prepare(request: Request) -> tuple[CoupledRotor, Flight, TrimResidual]:
-    """Rotor, flight and equations of a request. Raises InputError where something of it is not allowed."""
-    rotor, operating = catalogue.load(request.rotor)
+def check(request: Request) -> None:
+    """Raise InputError where something of a request is not allowed, whatever the inflow."""
     if request.slope_deg and request.height is None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
@@ -67,6 +66,12 @@ def prepare(request: Request) -> tuple[CoupledRotor, Flight, TrimResidual]:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), but is {request.climb:g}"
         )
+
+
+def prepare(request: Request) -> tuple[CoupledRotor, Flight, TrimResidual]:
+    """Rotor, flight and equations of a request. Raises InputError where something of it is not allowed."""
+    check(request)
+    rotor, operating = catalogue.load(request.rotor)
     ground = None if request.height is None else plane(request.height, request.slope_deg)
     p = coupled_rotor(rotor, operating, inflow_model(request.inflow, ground))
     area = np.pi * float(rotor.radius) ** 2

@@ -14,6 +14,9 @@ from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.segments import releases
 from rotorjax.wake.transport import AgeOperator, age_operator
 
+REVERSAL = 0.02
+"""Speed over ΩR within which the flow over a blade turns round; far below that of any station of a hovering rotor."""
+
 
 class WakeInputs(NamedTuple):
     """What drives the wake. collective: θ₀ (rad). climb: velocity over ΩR, positive up. height: over R, None for none.
@@ -49,16 +52,31 @@ def blade_loads(
 ) -> SectionLoads:
     """Section loads (K, R) from the air's velocity at the lifting line, in the blades' frames, and its circulation."""
     behind = model.settings.control_chords * model.chords
+    tangential, perpendicular, pitch = model.stations - control[..., 1], -control[..., 2], inputs.collective
+    downwash = gamma_bound @ chord_downwash(model.stations, model.edges, behind).T
+    if model.flight is not None:
+        flap, arm = model.flight.flap[:, None], model.stations - model.flight.hinge
+        tangential = model.flight.hinge + arm * jnp.cos(flap) - control[..., 1]
+        normal = control[..., 2] * jnp.cos(flap) - control[..., 0] * jnp.sin(flap)
+        perpendicular = arm * model.flight.flap_rate[:, None] - normal
+        pitch = pitch + model.flight.cyclic[:, None]
+    # where the flow over the blade is reversed the wake lies ahead of it, and the sign turns with it
+    downwash = downwash * jnp.tanh(tangential / REVERSAL)
     return section_loads(
         model.rotor,
         model.operating,
         model.stations,
-        model.stations - control[..., 1],
-        -control[..., 2],
-        collective=inputs.collective,
-        chord_downwash=gamma_bound @ chord_downwash(model.stations, model.edges, behind).T,
+        tangential,
+        perpendicular,
+        collective=pitch,
+        chord_downwash=downwash,
         span_mean=span_averages(model.stations, model.widths, model.settings.stall_chords * model.chords),
     )
+
+
+def leading_lines(model: FreeWake, count: int) -> Float[Array, "K R1 3"]:
+    """Lifting lines of K slices."""
+    return jax.vmap(lambda k: model.of_slice(k).leading)(jnp.arange(count))
 
 
 def rhs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, model: FreeWake) -> WakeState:
@@ -75,7 +93,7 @@ def rates(state: WakeState, velocities: Velocities, inputs: WakeInputs, model: F
     near, far = operators(model)
     start = jax.vmap(lambda s: releases(model, s))(state)
     wanted = blade_loads(model, velocities.control, state.gamma_bound, inputs).circulation
-    leading = jnp.broadcast_to(model.leading, (*state.near.shape[:2], 3))
+    leading = leading_lines(model, state.near.shape[0])
     return WakeState(
         near=velocities.near - _drift(near, state.near, leading),
         far=velocities.far - _drift(far, state.far, start.points),

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.rotor.blade_element import SectionLoads
-from rotorjax.wake.dynamics import blade_loads, inputs_of, operators
+from rotorjax.wake.dynamics import blade_loads, inputs_of, leading_lines, operators
 from rotorjax.wake.field import Velocities, node_velocities
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.roll_up import Release, release
@@ -66,7 +66,7 @@ def transported(model: FreeWake, found: Evaluation) -> Unknowns:
     """The wake that given velocities and loads produce."""
     near, far = operators(model)
     velocities = found.velocities
-    leading = jnp.broadcast_to(model.leading, (*velocities.near.shape[:2], 3))
+    leading = leading_lines(model, velocities.near.shape[0])
     return Unknowns(
         near=solve_nodes(near, velocities.near, leading),
         far=solve_nodes(far, velocities.far, found.start.points),

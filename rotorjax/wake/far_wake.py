@@ -13,17 +13,21 @@ from rotorjax.wake.vortex_core import core_radius
 def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]) -> Float[Array, "F C 3"]:
     """Nodes of the turns that follow the free ones: the last free turn, repeated under the flow in which it ends.
 
-    Out of ground effect the turn moves on by its own pitch; over ground it follows a stagnation flow, whose distance
-    from the plane falls by the ratio of the last two turns while its radius grows by the inverse square root. As
-    h → ∞ the second becomes the first. A wake cut off without closure expands and bunches at its end and pulls the
-    inflow at the disk with it.
+    Out of ground effect the turn moves on by its own pitch, and with the wind; over ground it follows a stagnation
+    flow, whose distance from the plane falls by the ratio of the last two turns while its radius grows by the inverse
+    square root. As h → ∞ the second becomes the first. A wake cut off without closure expands and bunches at its end
+    and pulls the inflow at the disk with it.
     """
     turn = model.settings.steps_per_turn
     last, before = nodes[:, -turn:], nodes[:, -2 * turn : -turn]
     repeats = range(1, model.settings.closure_turns + 1)
+    drift = jnp.zeros(3, nodes.dtype)
+    if model.flight is not None:
+        along = model.flight.wind.at[2].set(0.0)
+        drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
     if model.ground is None:
         pitch = jnp.mean(last[..., 2] - before[..., 2], axis=1)
-        down = jnp.stack([jnp.zeros_like(pitch), jnp.zeros_like(pitch), pitch], axis=-1)[:, None]
+        down = jnp.stack([jnp.zeros_like(pitch), jnp.zeros_like(pitch), pitch], axis=-1)[:, None] + drift
         return jnp.concatenate([last + k * down for k in repeats], axis=1)
     plane = model.ground
     # heights do not depend on the frame, so only the foot and the normal have to be turned into the blade's
@@ -33,8 +37,14 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     mean, mean_before = jnp.mean(height, axis=1), jnp.mean(_heights(before, normal, plane), axis=1)
     ratio = (mean / mean_before)[:, None, None]
     flat = last - height[..., None] * normal - foot
+    if model.flight is not None:
+        # in a wind the stagnation point goes with the turn
+        drift = drift - (drift @ normal) * normal
+        foot = foot + jnp.mean(flat, axis=1, keepdims=True)
+        flat = last - height[..., None] * normal - foot
     return jnp.concatenate(
-        [foot + flat * ratio ** (-0.5 * k) + height[..., None] * ratio**k * normal for k in repeats], axis=1
+        [foot + k * drift + flat * ratio ** (-0.5 * k) + height[..., None] * ratio**k * normal for k in repeats],
+        axis=1,
     )
 
 

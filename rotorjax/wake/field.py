@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.model import FreeWake, WakeState, along_blade, azimuths, slices
+from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
 from rotorjax.wake.roll_up import Release
 from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, near_lattice, releases
 
@@ -24,27 +24,29 @@ class Velocities(NamedTuple):
 def wake_segments(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Segments:
     """All segments of every slice, each in its blade's frame: fields (K, S, …)."""
 
-    def one(slice_, angle):
-        near = near_lattice(model, slice_, model.settings.near_core)
-        far = far_filaments(model, slice_, releases(model, slice_), angle)
-        return join(near, far, bound_vortex(model, slice_.gamma_bound))
+    def one(slice_, angle, k):
+        own = model.of_slice(k)
+        near = near_lattice(own, slice_, model.settings.near_core)
+        far = far_filaments(own, slice_, releases(own, slice_), angle)
+        return join(near, far, bound_vortex(own, slice_.gamma_bound))
 
-    return jax.vmap(one)(state, azimuths(state, psi))
+    return jax.vmap(one)(state, azimuths(state, psi), jnp.arange(slices(state)))
 
 
 def node_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Velocities:
     """Velocities at the blades' control points and at all wake nodes; slice 0 stands at azimuth psi."""
-    points = along_blade(model.stations)
     segments = wake_segments(model, state, psi)
 
     def one(operand):
         k, angle, slice_ = operand
+        own = model.of_slice(k)
+        points = own.control
         targets = jnp.concatenate([points, slice_.near.reshape(-1, 3), slice_.far.reshape(-1, 3)])
         v = _at_slice(model, segments, targets, k, angle)
         split = len(points), len(points) + slice_.near.size // 3
         control, near, far = jnp.split(v, split)
-        control = control + _sharpened(model, slice_, points)
-        far = far.reshape(slice_.far.shape) + self_induction(model, slice_)
+        control = control + _sharpened(own, slice_, points)
+        far = far.reshape(slice_.far.shape) + self_induction(own, slice_)
         return control, near.reshape(slice_.near.shape), far
 
     operands = (jnp.arange(slices(state)), azimuths(state, psi), state)
@@ -65,8 +67,8 @@ def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> 
 
 
 def _at_slice(model, segments, targets, k, angle):
-    """Induced velocity, climb and the auxiliary washout at points in the frame of slice k."""
-    return _induced(model, segments, targets, k, angle) + _carried(model, targets)
+    """Induced velocity, climb, wind and the auxiliary washout at points in the frame of slice k."""
+    return _induced(model, segments, targets, k, angle) + carried(model, angle)
 
 
 def _induced(model: FreeWake, segments: Segments, targets: Float[Array, "N 3"], k, angle) -> Float[Array, "N 3"]:
@@ -93,9 +95,10 @@ def _induced(model: FreeWake, segments: Segments, targets: Float[Array, "N 3"], 
     return rotate_about_shaft(v, -angle)
 
 
-def _carried(model: FreeWake, points: Float[Array, "N 3"]) -> Float[Array, "N 3"]:
-    """Climb and the solver's auxiliary flow, both axial."""
-    return jnp.zeros_like(points).at[:, 2].set(-model.climb - model.washout)
+def carried(model: FreeWake, angle: Float[Array, ""]) -> Float[Array, "3"]:
+    """What the wake is carried by besides itself, in the frame at `angle`: climb, wind, the solver's auxiliary flow."""
+    axial = jnp.zeros(3, model.climb.dtype).at[2].set(-model.climb - model.washout)
+    return axial if model.flight is None else axial + rotate_about_shaft(model.flight.wind, -angle)
 
 
 def _sharpened(model: FreeWake, slice_: WakeState, points: Float[Array, "R 3"]) -> Float[Array, "R 3"]:

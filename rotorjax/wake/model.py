@@ -11,9 +11,10 @@ frame: x outboard along the blade, y in the direction of rotation, z up. One lay
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
@@ -39,11 +40,26 @@ class WakeState(eqx.Module):
     gamma_bound: Float[Array, "K R"]
 
 
+class Flight(eqx.Module):
+    """How hub and blades move, beyond a rigid rotor that hovers or climbs.
+
+    wind (3,): velocity of the air far away, seen from the hub, over ΩR, in the hub frame (x aft, z up); the operating
+    point's climb comes on top. hinge: e/R of the flap hinge. flap, flap_rate (K,): of the blade of each slice (rad, per
+    rad). cyclic (K,): its pitch beyond collective and twist (rad).
+    """
+
+    wind: Float[Array, "3"]
+    hinge: Float[Array, ""]
+    flap: Float[Array, " K"]
+    flap_rate: Float[Array, " K"]
+    cyclic: Float[Array, " K"]
+
+
 class FreeWake(eqx.Module):
     """Parameters of the free wake: rotor, operating point, ground and settings, all leaves differentiable.
 
     washout: velocity (over ΩR) of an auxiliary flow that carries the wake away, 0 in every physical case; the solver
-    starts with it and takes it back (solution.py).
+    starts with it and takes it back (solution.py). flight: None for rigid blades in hover or climb.
     """
 
     rotor: Rotor
@@ -51,6 +67,14 @@ class FreeWake(eqx.Module):
     ground: Plane | None
     settings: WakeSettings
     washout: Float[Array, ""]
+    flight: Flight | None = None
+
+    def of_slice(self, k: int | Int[Array, ""]) -> "FreeWake":
+        """The model of one slice: its blade's motion alone."""
+        if self.flight is None:
+            return self
+        own = jax.tree.map(lambda a: a[k], (self.flight.flap, self.flight.flap_rate, self.flight.cyclic))
+        return eqx.tree_at(lambda m: (m.flight.flap, m.flight.flap_rate, m.flight.cyclic), self, own)
 
     @property
     def edges(self) -> Float[Array, " R+1"]:
@@ -71,12 +95,17 @@ class FreeWake(eqx.Module):
 
     @property
     def leading(self) -> Float[Array, "R+1 3"]:
-        """Nodes of the lifting line, a straight line along the blade axis.
+        """Nodes of the lifting line, a straight line along the blade axis; of a flapping blade, ask for its slice.
 
         The swept tip is kept in the geometry (`geometry.sweep_offset`) but the lifting line stays straight: a kink in
         it would see its own logarithmic singularity.
         """
-        return along_blade(self.edges)
+        return on_blade(self, self.edges)
+
+    @property
+    def control(self) -> Float[Array, "R 3"]:
+        """Control points on the blade; of a flapping blade, ask for its slice."""
+        return on_blade(self, self.stations)
 
     @property
     def chords(self) -> Float[Array, " R"]:
@@ -118,6 +147,16 @@ def free_wake(
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:
     """Points on the blade's axis at r, in the blade's frame."""
     return jnp.stack([r, jnp.zeros_like(r), jnp.zeros_like(r)], axis=-1)
+
+
+def on_blade(model: FreeWake, r: Float[Array, " N"]) -> Float[Array, "N 3"]:
+    """Points at r on the blade of a slice's model, flapped about its hinge, in the blade's frame."""
+    if model.flight is None:
+        return along_blade(r)
+    hinge, flap = model.flight.hinge, model.flight.flap
+    return along_blade(jnp.full_like(r, hinge)) + (r - hinge)[:, None] * jnp.stack(
+        [jnp.cos(flap), jnp.zeros_like(flap), jnp.sin(flap)]
+    )
 
 
 def slices(state: WakeState) -> int:

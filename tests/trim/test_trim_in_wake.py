@@ -1,0 +1,96 @@
+"""Trim in a small free wake: what it was asked for, power balance, symmetry, derivatives, the commands' numbers."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.errors import InputError
+from rotorjax.ground import plane
+from rotorjax.rotor.catalogue import load
+from rotorjax.rotor.hub import rotor_inputs
+from rotorjax.trim.dispatch import check_request
+from rotorjax.trim.free_wake import residual
+from rotorjax.trim.in_wake import means, trim_in_wake, wake_trim
+from rotorjax.trim.in_wake_run import run_in_wake, wake_numbers
+from rotorjax.trim.run import Request
+from rotorjax.wake.settings import flight_settings, wake_settings
+
+THRUST = 0.0058
+TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "free_turns": 2.0, "closure_turns": 1}
+
+
+@pytest.fixture(scope="module")
+def cruise():
+    request = Request("uh60", THRUST, "freewake", 0.2, tilt_deg=4.0)
+    return run_in_wake(request, flight_settings(4, **TINY, azimuths=8))
+
+
+@pytest.fixture(scope="module")
+def told(cruise):
+    return wake_numbers(cruise)
+
+
+@pytest.mark.slow
+def test_forward_flight_is_trimmed(told):
+    assert told["converged"]
+    assert told["residual"] < 1e-7
+    assert told["CT"] == pytest.approx(THRUST, rel=1e-6)
+    assert abs(told["beta_1c_deg"]) < 1e-5
+    assert abs(told["beta_1s_deg"]) < 1e-5
+    assert told["theta_1s_deg"] < -1 < 0.5 < told["theta_1c_deg"]
+
+
+@pytest.mark.slow
+def test_power_adds_up(told):
+    """The shaft's work goes into induced flow, drag and flight; blades keep none over a revolution."""
+    parts = sum(told[f"CP_{part}"] for part in ("induced", "profile", "parasite"))
+    assert parts == pytest.approx(told["CP"], rel=2e-5)
+
+
+@pytest.mark.slow
+def test_induced_power_is_above_glauerts_least(told):
+    wind = np.hypot(told["advance_ratio"], 0.03)
+    assert 1.0 < told["CP_induced"] / (THRUST**2 / (2 * wind)) < 1.6
+
+
+@pytest.mark.slow
+def test_residual_has_the_derivative_of_finite_differences(cruise):
+    z, p = cruise.trimmed.z, cruise.trimmed.p
+    keys = iter(jax.random.split(jax.random.key(1), 20))
+    way = jax.tree.map(lambda a: jax.random.normal(next(keys), a.shape), z)
+    function = eqx.filter_jit(residual)
+    slope = eqx.filter_jit(lambda z, p, v: jax.jvp(lambda y: residual(y, p), (z,), (v,))[1])(z, p, way)
+
+    def at(step):
+        return function(jax.tree.map(lambda a, v: a + step * v, z, way), p)
+
+    step = 1e-6
+    near = jax.tree.map(lambda a, b: (a - b) / (2 * step), at(step), at(-step))
+    flat = [np.concatenate([np.ravel(a) for a in jax.tree.leaves(t)]) for t in (slope, near)]
+    assert np.linalg.norm(flat[0] - flat[1]) < 1e-6 * np.linalg.norm(flat[1])
+
+
+@pytest.mark.slow
+def test_hover_needs_no_cyclic():
+    settings = wake_settings(panels=8, age_step_deg=20.0, near_wake_deg=100.0, free_turns=3.0, closure_turns=3)
+    p = wake_trim(*load("uh60"), rotor_inputs(), THRUST, settings=settings)
+    found = trim_in_wake(p, jnp.array([0.31, 0.0, 0.0]), 0.05)
+    flown = means(found)
+    assert found.outcome.converged
+    assert pytest.approx(flown.CT, rel=1e-6) == THRUST
+    assert flown.CP_induced + flown.CP_profile == pytest.approx(flown.CQ, rel=1e-6)
+    assert flown.CP_parasite == 0
+    assert 0.04 < flown.flap[0] < 0.07
+
+
+def test_what_the_free_wake_cannot_do_is_refused():
+    with pytest.raises(InputError, match="`for` must be 'flapping'"):
+        check_request(Request("uh60", THRUST, "freewake", aim="moments"))
+    with pytest.raises(InputError, match="did you mean 'freewake'"):
+        check_request(Request("uh60", THRUST, "freewak"))
+    climbing = rotor_inputs(w=-0.02, height=1.0)
+    p = wake_trim(*load("uh60"), climbing, THRUST, plane(1.0))
+    with pytest.raises(InputError, match="its climb is"):
+        trim_in_wake(p, jnp.zeros(3), 0.0)
