@@ -1,18 +1,21 @@
 """The finite-state potential flow (VPBFSM) as an inflow model: pressure coefficients of the blades' loads drive it.
 
-The wind is taken along the disk's x axis: its sideways part turns the frame that the states are written in, out of
-ground effect; over a slope the ground fixes the frame and a side wind is refused by whoever sets it.
+The model knows a wind along the disk's x axis. A wind from elsewhere is one along x in a frame turned to it: harmonics
+m of states and loads turn by m times its angle, and the rates turn back. In air at rest there is no angle; there the
+rates of a wind along x and of one along y add up, which is exact to first order, so that derivatives are right.
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax.ground import Plane
 from rotorjax.inflow.interface import DiskLoads, InflowModel
-from rotorjax.inflow.momentum import downward, hover_inflow
+from rotorjax.inflow.momentum import downward, edgewise, hover_inflow
 from rotorjax.potential import dynamics, loading
 from rotorjax.potential.model import FiniteState, FiniteStateModel, disk_inflow, finite_state_model
+from rotorjax.potential.modes import ModeTable
 from rotorjax.rotor.hub import RotorInputs
 
 
@@ -36,16 +39,47 @@ class FiniteStateInflow(InflowModel):
     def rate(self, state: Float[Array, " M"], loads: DiskLoads, inputs: RotorInputs) -> Float[Array, " M"]:
         """Eq. 1 under the blades' pressure coefficients (Eq. 2)."""
         tau = loading.from_blades(loads.lift, loads.r, loads.widths, loads.psi, self.model.modes)
+        aft, starboard = edgewise(inputs)
+        rest = (aft == 0) & (starboard == 0)
+        speed = jnp.where(rest, aft, jnp.sqrt(jnp.where(rest, 1.0, aft**2 + starboard**2)))
+        cosine = jnp.where(rest, 1.0, aft / jnp.where(rest, 1.0, speed))
+        sine = jnp.where(rest, 0.0, starboard / jnp.where(rest, 1.0, speed))
+        zero, one = jnp.zeros_like(speed), jnp.ones_like(speed)
+        # along the wind, along y, and in no wind at all
+        winds = jnp.stack([jnp.stack(w) for w in ((cosine, sine, speed), (zero, one, starboard), (one, zero, zero))])
+        along, across, none = jax.vmap(lambda wind: self._turned_rate(state, tau, wind, inputs.climb))(winds)
+        return jnp.where(rest, along + across - none, along)
+
+    def _turned_rate(
+        self, state: Float[Array, " M"], tau: Float[Array, " M"], wind: Float[Array, "3"], climb: Float[Array, ""]
+    ) -> Float[Array, " M"]:
+        """Rate in a wind given by the cosine and sine of its direction, aft towards starboard, and its speed."""
+        turn = _turn(self.model.modes, wind[0], wind[1])
         alone = eqx.tree_at(lambda m: m.ground, self.model, None, is_leaf=lambda g: isinstance(g, Plane) or g is None)
-        driven = dynamics.RotorInputs(tau, inputs.u, inputs.climb)
-        rest = FiniteState(state, jnp.zeros(len(self.model.sources), state.dtype))
-        return dynamics.rhs(jnp.zeros(()), rest, driven, alone).a
+        start = FiniteState(turn @ state, jnp.zeros(len(self.model.sources), state.dtype))
+        rate = dynamics.rhs(jnp.zeros(()), start, dynamics.RotorInputs(turn @ tau, wind[2], climb), alone)
+        return turn.T @ rate.a
 
     def _over(self, inputs: RotorInputs) -> FiniteStateModel:
         """The model over ground at the inputs' height."""
         if self.model.ground is None or inputs.height is None:
             return self.model
         return eqx.tree_at(lambda m: m.ground.height, self.model, inputs.height)
+
+
+def _turn(modes: ModeTable, cosine: Float[Array, ""], sine: Float[Array, ""]) -> Float[Array, "M M"]:
+    """Coefficients of cos mψ and sin mψ in a frame turned by an angle, from those in this one."""
+    columns = {(mode.m, mode.n, mode.kind): k for k, mode in enumerate(modes.modes)}
+    matrix = jnp.eye(len(modes), dtype=cosine.dtype)
+    for (m, n, kind), k in columns.items():
+        if m == 0 or kind == "sin":
+            continue
+        c, s = jnp.ones_like(cosine), jnp.zeros_like(sine)
+        for _ in range(m):
+            c, s = c * cosine - s * sine, s * cosine + c * sine
+        other = columns[m, n, "sin"]
+        matrix = matrix.at[k, k].set(c).at[k, other].set(s).at[other, k].set(-s).at[other, other].set(c)
+    return matrix
 
 
 def finite_state(ground: Plane | None = None, harmonics: int = 2, radial_terms: int = 3) -> FiniteStateInflow:
