@@ -131,11 +131,11 @@ def _raised(failed: Trimmed, p: CoupledRotor, flight: Flight, azimuths: int) -> 
     """Raise the thrust in steps to the wanted one, each trim from the last; if that fails, say how far it came."""
     wanted, reached, z = float(flight.thrust), 0.0, None
     step = wanted / 2
-    while step > 0.01 * wanted:
+    while step > 0.02 * wanted:
         target = min(wanted, reached + step)
         condition = eqx.tree_at(lambda f: f.thrust, flight, jnp.asarray(target))
         near = guess(p, condition, azimuths) if z is None else z
-        outcome = newton(failed.residual, near, condition, p, tol=TOL, measure=largest)
+        outcome = newton(failed.residual, near, condition, p, tol=TOL, measure=largest, max_iterations=12)
         if not outcome.converged:
             step /= 2
             continue
