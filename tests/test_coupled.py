@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.flatten_util import ravel_pytree
 
 from rotorjax.coupled import CoupledState, coupled_rotor, output, rhs, still_state
 from rotorjax.inflow.momentum import Uniform, uniform
@@ -84,6 +85,16 @@ def test_response_to_a_steady_pitch_rate(slopes):
     np.testing.assert_allclose(abs(flap[2]), 1.0, rtol=5e-4)
 
 
+def test_pitch_flap_coupling_stiffens_the_blade(slopes):
+    """δ₃ takes tan δ₃ of pitch away per flap: γ/8 tan δ₃ more stiffness in hover."""
+    stiffness = []
+    for delta3 in (0.0, 0.5):
+        p = coupled_rotor(*plain_rotor(delta3=delta3), NoInflow(jnp.ones(())), 96)
+        u = rotor_inputs()
+        stiffness.append(-float(slopes(at_rest(p, u), u, p)[0][0, 0]))
+    np.testing.assert_allclose(stiffness[1] - stiffness[0], lock_number(p) / 8 * np.tan(0.5), rtol=1e-3)
+
+
 def test_coning(rate):
     """β_0 = γ(θ/8 − λ/6) less the blade's weight, to 1 %: small angles, no offset."""
     p = coupled_rotor(*plain_rotor(), NoInflow(jnp.ones(())), 96)
@@ -149,12 +160,12 @@ def test_derivatives(rate):
     p = coupled_rotor(rotor, point, pitt_peters(), 8)
     u = rotor_inputs(theta_0=0.15, theta_1s=-0.04, u=0.2, w=-0.02, p=0.01, height=1.0, omega_rate=0.01)
     x = still_state(p, u, 0.006)
-    flat, back = jax.flatten_util.ravel_pytree((x, u))
+    flat, back = ravel_pytree((x, u))
     flat = flat + 1e-3 * jnp.arange(flat.size) / flat.size
 
     def f(v):
         x, u = back(v)
-        return jax.flatten_util.ravel_pytree(rhs(jnp.zeros(()), x, u, p))[0]
+        return ravel_pytree(rhs(jnp.zeros(()), x, u, p))[0]
 
     rng = np.random.default_rng(1)
     ways = jnp.asarray(rng.normal(size=(6, flat.size)))
