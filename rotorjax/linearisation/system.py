@@ -7,6 +7,8 @@ slice (K = 1) is the whole of that model, not an approximation.
 Over a slope the state changes with the azimuth and repeats from blade to blade, after 2π/B. Disturbances that are the
 same on all blades (`blades="alike"`) still make a model of one slice, the mean of the blades' rates; it leaves out that
 a slope turns them into disturbances that differ from blade to blade and back, which is of second order in the slope.
+Within a passage the mean hardly changes: at 10° and h = 1 the first harmonic of A(ψ) is 0.13 % of its mean, and leaving
+it out changes the response to a step of collective by less than 1e-6, so that averaging is the default.
 `blades="all"` keeps every blade's own states.
 """
 
