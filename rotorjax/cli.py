@@ -63,7 +63,7 @@ def _set_up_jax() -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    if jax.config.jax_compilation_cache_dir is None:
+    if jax.config.values["jax_compilation_cache_dir"] is None:
         jax.config.update("jax_compilation_cache_dir", str(program_cache()))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
 

@@ -9,8 +9,10 @@ the commands that the tests start, which get it through the environment.
 import os
 from pathlib import Path
 
-import jax
-import pytest
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
+
+import jax  # noqa: E402
+import pytest  # noqa: E402
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 SHORTEST = 0.3  # seconds of compilation that are worth a file
