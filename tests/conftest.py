@@ -11,8 +11,8 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
 
-import jax  # noqa: E402
-import pytest  # noqa: E402
+import jax
+import pytest
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 SHORTEST = 0.3  # seconds of compilation that are worth a file
