@@ -1,7 +1,8 @@
 """The rotor and its inflow as one first-order system x' = rhs(t, x, u, p), x = (ψ, flap, lag, inflow).
 
 Time is Ω_ref t (rad) and everything is in rotor units (rotor/hub.py). Flap and lag are kept in multi-blade coordinates,
-as in Eq. 10, so that a steady flight is a steady state but for vibration, and repeats B times a revolution.
+as in Eq. 10, so that a steady flight is a steady state but for vibration, and repeats B times a revolution. The inflow
+is a model over the disk (inflow/) or the free wake itself (coupled_wake.py); p says which.
 """
 
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
+from rotorjax.coupled_wake import BladesAt, CoupledWake, in_wake, velocity_in
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.inflow.interface import DiskLoads, InflowModel
 from rotorjax.operating import OperatingPoint
@@ -51,6 +53,9 @@ class CoupledRotor(eqx.Module):
     panels: int = eqx.field(static=True, default=24)
 
 
+Coupled = CoupledRotor | CoupledWake
+
+
 class Outputs(NamedTuple):
     """What the rotor does at one instant; over ρA(ΩR)², its product with R for moments and with ΩR for power.
 
@@ -76,7 +81,7 @@ class Outputs(NamedTuple):
 
 
 class _Evaluation(NamedTuple):
-    """Everything that rhs and output share; leading axis B but for state and loads."""
+    """Everything that rhs and output share; leading axis B but for inflow, the rate of the inflow's state."""
 
     psi: Float[Array, " B"]
     frames: TurningFrame
@@ -84,7 +89,7 @@ class _Evaluation(NamedTuple):
     q_dot: Float[Array, "B 2"]
     q_dot_dot: Float[Array, "B 2"]
     air: AirLoads
-    loads: DiskLoads
+    inflow: PyTree
 
 
 def coupled_rotor(rotor: Rotor, operating: OperatingPoint, inflow: InflowModel, panels: int = 24) -> CoupledRotor:
@@ -99,35 +104,33 @@ def still_state(p: CoupledRotor, u: RotorInputs, thrust: float) -> CoupledState:
     return CoupledState(jnp.zeros(()), rotor, p.inflow.start(jnp.asarray(thrust), u))
 
 
-def rhs(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> CoupledState:
+def rhs(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled) -> CoupledState:
     """Rate of the state per radian of Ω_ref t; t itself does not enter."""
     return rate_and_output(t, x, u, p)[0]
 
 
-def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor) -> Outputs:
+def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled) -> Outputs:
     """Loads, power and blade motion at one instant."""
     return rate_and_output(t, x, u, p)[1]
 
 
-def rate_and_output(
-    t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: CoupledRotor
-) -> tuple[CoupledState, Outputs]:
+def rate_and_output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled) -> tuple[CoupledState, Outputs]:
     """Both from one evaluation of the blades."""
     del t
     found = _evaluate(x, u, p)
-    return _rate(found, x, u, p), _output(found, u, p)
+    return _rate(found, x, u), _output(found, u, p)
 
 
-def _rate(found: _Evaluation, x: CoupledState, u: RotorInputs, p: CoupledRotor) -> CoupledState:
+def _rate(found: _Evaluation, x: CoupledState, u: RotorInputs) -> CoupledState:
     flap, lag = (
         multiblade.accelerations(found.q_dot_dot[:, i], q, q_dot, x.psi, u.omega, u.omega_rate)
         for i, (q, q_dot) in enumerate([(x.rotor.flap, x.rotor.flap_rate), (x.rotor.lag, x.rotor.lag_rate)])
     )
     rotor = RotorState(x.rotor.flap_rate, flap, x.rotor.lag_rate, lag)
-    return CoupledState(u.omega, rotor, p.inflow.rate(x.inflow, found.loads, u))
+    return CoupledState(u.omega, rotor, found.inflow)
 
 
-def _output(found: _Evaluation, u: RotorInputs, p: CoupledRotor) -> Outputs:
+def _output(found: _Evaluation, u: RotorInputs, p: Coupled) -> Outputs:
     on_hub = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(
         found.frames, found.q, found.q_dot, found.q_dot_dot, found.air.force, found.air.moment
     )
@@ -147,7 +150,7 @@ def _output(found: _Evaluation, u: RotorInputs, p: CoupledRotor) -> Outputs:
         flap=found.q[:, 0],
         lag=found.q[:, 1],
         alpha=found.air.loads.alpha,
-        lift=found.loads.lift,
+        lift=found.air.per_length[..., 2],
     )
 
 
@@ -156,26 +159,64 @@ def sections_of(p: CoupledRotor) -> Sections:
     return blade_sections(p.rotor, p.panels)
 
 
-def _evaluate(x: CoupledState, u: RotorInputs, p: CoupledRotor) -> _Evaluation:
-    sections = sections_of(p)
+def stations(p: Coupled) -> Float[Array, " R"]:
+    """Where the blade's loads are known, over R."""
+    return p.stations if isinstance(p, CoupledWake) else sections_of(p).r
+
+
+def inflow_velocity(x: CoupledState, points: Float[Array, "N 3"], u: RotorInputs, p: Coupled) -> Float[Array, "N 3"]:
+    """Induced velocity at points near the disk, hub frame, over Ω_ref R."""
+    if isinstance(p, CoupledWake):
+        return velocity_in(x.inflow, points, u, blades_at(x, u, p), p)
+    return p.inflow.velocity(x.inflow, points, u)
+
+
+def blades_at(x: CoupledState, u: RotorInputs, p: Coupled) -> BladesAt:
+    """Azimuth, flap and pitch of the blades."""
+    psi, q, q_dot = _angles(x, u, p)
+    return BladesAt(psi, q[:, 0], q_dot[:, 0], _pitch(psi, q, u, p))
+
+
+def _angles(x: CoupledState, u: RotorInputs, p: Coupled):
     psi = multiblade.azimuths(x.psi, p.rotor.blades)
     angles = [
         multiblade.to_blades(q, q_dot, x.psi, u.omega)
         for q, q_dot in ((x.rotor.flap, x.rotor.flap_rate), (x.rotor.lag, x.rotor.lag_rate))
     ]
     q, q_dot = (jnp.stack(pair, axis=-1) for pair in zip(*angles, strict=True))
+    return psi, q, q_dot
+
+
+def _pitch(psi: Float[Array, " B"], q: Float[Array, "B 2"], u: RotorInputs, p: Coupled) -> Float[Array, " B"]:
+    return pitch(u, psi) - p.blade.coupling * (q[:, 0] - p.blade.precone)
+
+
+def _evaluate(x: CoupledState, u: RotorInputs, p: Coupled) -> _Evaluation:
+    psi, q, q_dot = _angles(x, u, p)
     frames = jax.vmap(lambda psi: turning_frame(u, psi, p.blade.gravity))(psi)
+    theta = _pitch(psi, q, u, p)
+    if isinstance(p, CoupledWake):
+        air, inflow = in_wake(x.inflow, u, BladesAt(psi, q[:, 0], q_dot[:, 0], theta), p)
+    else:
+        air, inflow = _in_inflow(x.inflow, u, p, psi, frames, q, q_dot, theta)
+    q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)
+    if isinstance(p, CoupledWake):
+        q_dot_dot = q_dot_dot.at[:, 1].set(0.0)  # held
+    return _Evaluation(psi, frames, q, q_dot, q_dot_dot, air, inflow)
+
+
+def _in_inflow(state: PyTree, u: RotorInputs, p: CoupledRotor, psi, frames, q, q_dot, theta) -> tuple[AirLoads, PyTree]:
+    """Air loads of all blades in a model's inflow, and the rate of its state."""
+    sections = sections_of(p)
     motion = jax.vmap(flap_lag.motion_of)(q, q_dot)
     in_frame = jax.vmap(lambda m: places(p.blade, m, sections.r))(motion)
     points = rotate_about_shaft(in_frame, psi[:, None])
-    induced = rotate_about_shaft(p.inflow.velocity(x.inflow, points, u), -psi[:, None])
-    theta = pitch(u, psi) - p.blade.coupling * (q[:, 0] - p.blade.precone)
+    induced = rotate_about_shaft(p.inflow.velocity(state, points, u), -psi[:, None])
 
     def loads_of(frame, motion, theta, induced):
         return air_loads(p.rotor, p.operating, p.blade, sections, frame, motion, theta, induced)
 
     air = jax.vmap(loads_of)(frames, motion, theta, induced)
-    q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)
     lift = air.per_length[..., 2]
     loads = DiskLoads(lift, points, sections.widths, psi, sections.r, jnp.sum(air.force[:, 2]) / jnp.pi)
-    return _Evaluation(psi, frames, q, q_dot, q_dot_dot, air, loads)
+    return air, p.inflow.rate(state, loads, u)

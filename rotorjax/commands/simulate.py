@@ -11,7 +11,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         "simulate",
         help="the coupled rotor under histories of controls and hub motion",
         description="March flap, lag and inflow from a trim and write history.nc, report.json, histories.png and, on "
-        "request, animation.gif. `rotorjax.simulation.case` shows a case file.",
+        "request, animation.gif; of a free wake also wake.png and a folder vtk for ParaView. "
+        "`rotorjax.simulation.case` shows a case file.",
     )
     parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
@@ -23,26 +24,17 @@ def run(chosen: argparse.Namespace) -> int:
     """Fly and write; the exit code."""
     from tqdm import tqdm
 
-    from rotorjax import plotting
-    from rotorjax.io import netcdf
-    from rotorjax.io.atomic import make_folder, write_json
-    from rotorjax.simulation import output
+    from rotorjax.io.atomic import make_folder
     from rotorjax.simulation.case import read_case
+    from rotorjax.simulation.files import write_all
     from rotorjax.simulation.run import fly
 
     case = read_case(chosen.case)
     out = make_folder(chosen.out)
     with tqdm(desc="simulate", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
         found = fly(case, bar.set_postfix_str)
-        data = output.dataset(found)
-        netcdf.write(out / "history.nc", data)
-        told = output.report(found, data)
-        write_json(out / "report.json", told)
-        bar.set_postfix_str("pictures")
-        plotting.save(output.histories(data), out / "histories")
-        if chosen.gif:
-            bar.set_postfix_str("animation")
-            output.animation(found, data, out / "animation.gif")
+        bar.set_postfix_str("files")
+        told = write_all(found, out, animated=chosen.gif)
     for name, row in told["histories"].items():
         print(f"{name:14s} " + "  ".join(f"{key} {row[key]:9.5f}" for key in ("first", "last", "min", "max")))
     print(
@@ -50,6 +42,9 @@ def run(chosen: argparse.Namespace) -> int:
         f"({told['march_s_per_revolution']:.3f} s a revolution, {told['real_time_factor']:.2f} times real time): "
         f"{out / 'report.json'}"
     )
+    if "wake_change_last" in told:
+        last, most = told["wake_change_last"], told["wake_change_max"]
+        print(f"wake nodes moved over the last revolution by {last:.2e} R (rms), over any by up to {most:.2e} R")
     if not found.finished:
         print(f"the march ended early: {found.why}")
     return 0 if found.finished else 1

@@ -9,11 +9,14 @@
 
     [time]
     duration = 3.0             # s
-    steps_per_turn = 120       # optional
+    steps_per_turn = 120       # optional: else 120, or what a free wake needs
 
     [history]                  # optional: what is added to the trim, smooth between the points
     t = [0.0, 0.5, 0.6, 3.0]   # s
     collective_deg = [0.0, 0.0, 1.0, 1.0]
+
+With inflow = "freewake" a table [wake] may set what `rotorjax.wake.settings.wake_settings` takes: panels, age_step_deg,
+near_wake_deg, free_turns, closure_turns, azimuths (of the trim), tip_core and so on.
 
 Further columns: theta_1c_deg, theta_1s_deg; u, v, w: velocity of the hub in m/s, forward, to starboard and down along
 the shaft's axes; p_deg, q_deg, r_deg: its angular rates in deg/s; rotor_speed: Ω in per cent of the nominal one. Their
@@ -21,8 +24,9 @@ rates, Ω̇ included, follow from them. Over ground the height follows from the 
 is not carried along: gravity stays along the shaft, and u, v, w are what they are said to be.
 """
 
+import inspect
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +38,9 @@ from rotorjax.errors import InputError
 from rotorjax.rotor.checks import check_number
 from rotorjax.rotor.rotor_file import closest
 from rotorjax.simulation.history import read_history, smooth
+from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
 from rotorjax.trim.run import Request
+from rotorjax.wake.settings import wake_settings
 
 COLUMNS = (
     *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
@@ -42,21 +48,24 @@ COLUMNS = (
 )
 """In the order of Eq. 11."""
 _FLIGHT = ("rotor", "inflow", "thrust_coefficient", "advance_ratio", "height", "slope_deg", "tilt_deg", "drag_area")
-_KEYS = {"flight": _FLIGHT, "time": ("duration", "steps_per_turn"), "history": None}
+_WAKE = tuple(name for name in inspect.signature(wake_settings).parameters if name not in ("inboard", "roll_up"))
+_KEYS = {"flight": _FLIGHT, "time": ("duration", "steps_per_turn"), "history": None, "wake": _WAKE}
 _MOST_STEPS = 200_000
 
 
 @dataclass(frozen=True)
 class SimulationCase:
     """One flight. request: the trim that it starts from. duration (s). steps_per_turn. t (P,) in s, columns (P, 10):
-    what is added to the trim, in the file's units and the order of COLUMNS; rotor_speed is what it is.
+    what is added to the trim, in the file's units and the order of COLUMNS; rotor_speed is what it is. wake: settings
+    of the free wake other than the trim's own.
     """
 
     request: Request
     duration: float
-    steps_per_turn: int
+    steps_per_turn: int | None
     t: Float[np.ndarray, " P"]
     columns: Float[np.ndarray, "P C"]
+    wake: dict[str, Any] = field(default_factory=dict)
 
     def polynomials(self) -> PPoly:
         """Smooth histories over time in s."""
@@ -86,8 +95,10 @@ def _build(data: dict[str, Any], folder: Path) -> SimulationCase:
     _check_keys(data)
     flight, times = data["flight"], data["time"]
     duration = float(check_number("time.duration", times["duration"], 0.0, open_=True))  # type: ignore[arg-type]
-    steps = times.get("steps_per_turn", 120)
-    if isinstance(steps, bool) or not isinstance(steps, int) or not 24 <= steps <= 1440 or steps % 12:
+    steps = times.get("steps_per_turn")
+    if steps is not None and (
+        isinstance(steps, bool) or not isinstance(steps, int) or not 24 <= steps <= 1440 or steps % 12
+    ):
         raise InputError(f"[time] steps_per_turn must be a multiple of 12 from 24 to 1440, but is {steps!r}")
     history = dict(data.get("history", {}))
     t, columns = read_history(history, COLUMNS, duration)
@@ -97,7 +108,36 @@ def _build(data: dict[str, Any], folder: Path) -> SimulationCase:
     if slow.size:
         value = columns[slow[0], -1]
         raise InputError(f"[history] rotor_speed must lie in [50, 150] per cent, but is {value:g} at {t[slow[0]]:g} s")
-    return SimulationCase(_request(flight, folder), duration, steps, t, columns)
+    case = SimulationCase(_request(flight, folder), duration, steps, t, columns, dict(data.get("wake", {})))
+    _check_wake(case)
+    return case
+
+
+def _check_wake(case: SimulationCase) -> None:
+    """What the free wake cannot do, and settings of it that nothing would read."""
+    request = case.request
+    if request.inflow != FREE_WAKE:
+        if case.wake:
+            raise InputError(f'[wake] must come with inflow = "{FREE_WAKE}" in [flight], but it is "{request.inflow}"')
+        return
+    for name, value in case.wake.items():
+        check_number(f"wake.{name}", value)
+    if request.height is None:
+        return
+    # the ground stays where it is, seen from the hub: it neither turns with the air nor rises under a moving hub
+    fixed = ("p_deg", "q_deg", "r_deg", "u", "v") if request.slope_deg else ("p_deg", "q_deg")
+    for name in fixed:
+        values = case.columns[:, COLUMNS.index(name)]
+        if np.any(values):
+            ground = "sloping ground" if request.slope_deg else "ground"
+            raise InputError(
+                f"[history] {name} must be 0 over {ground} in the free wake, but reaches "
+                f"{values[np.argmax(np.abs(values))]:g}: leave the height out or take another inflow"
+            )
+    if request.slope_deg and request.advance:
+        raise InputError(
+            f"[flight] advance_ratio must be 0 over sloping ground in the free wake, but is {request.advance:g}"
+        )
 
 
 def _request(flight: dict[str, Any], folder: Path) -> Request:
@@ -127,10 +167,10 @@ def _check_keys(data: dict[str, Any]) -> None:
             raise InputError(f"[{table}] must have the key '{key}', but it is missing")
 
 
-def steps_of(case: SimulationCase, omega: float) -> int:
-    """Number of steps of the march, a multiple of twelve. Raises InputError where they are too many."""
+def steps_of(case: SimulationCase, omega: float, per_turn: int) -> int:
+    """Number of steps of a march, a multiple of twelve; per_turn: of a revolution. Raises InputError for too many."""
     turns = case.duration * omega / (2 * np.pi)
-    steps = 12 * max(1, round(turns * case.steps_per_turn / 12))
+    steps = 12 * max(1, round(turns * per_turn / 12))
     if steps > _MOST_STEPS:
         raise InputError(f"[time] duration must make at most {_MOST_STEPS} steps, but {case.duration:g} s make {steps}")
     return steps

@@ -3,18 +3,20 @@
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
 from rotorjax import plotting
-from rotorjax.coupled import CoupledRotor, sections_of
-from rotorjax.io.atomic import whole_file
+from rotorjax.coupled import inflow_velocity, stations
+from rotorjax.coupled_wake import CoupledWake
 from rotorjax.rotor import multiblade
+from rotorjax.simulation.film import write_film
 from rotorjax.simulation.run import SAVES, Simulated
+from rotorjax.simulation.wake_output import wake_arrays
 
 _RAYS, _RADII, _MOST_FRAMES = 36, 16, 90
 _LINES = ("-", "--", ":", "-.", (0, (1, 3)))
@@ -35,7 +37,12 @@ def dataset(found: Simulated) -> xr.Dataset:
             "blade": np.arange(p.rotor.blades),
             "axis": ["aft", "starboard", "up"],
         },
-        attrs={"rotor": p.rotor.name, "inflow": found.case.request.inflow, "finished": int(found.finished)},
+        attrs={
+            "rotor": p.rotor.name,
+            "inflow": found.case.request.inflow,
+            "slope_deg": found.case.request.slope_deg,
+            "finished": int(found.finished),
+        },
     )
     data["azimuth"] = ("time", np.asarray(x.psi), {"units": "rad"})
     for name in ("theta_0", "theta_1c", "theta_1s"):
@@ -55,28 +62,32 @@ def dataset(found: Simulated) -> xr.Dataset:
     data["hub_force"] = (("time", "axis"), np.asarray(y.force) * force, {"units": "N"})
     data["hub_moment"] = (("time", "axis"), np.asarray(y.moment) * force * radius, {"units": "N m"})
     data["largest_alpha"] = ("time", np.rad2deg(np.max(np.asarray(y.alpha), axis=(1, 2))), degrees)
-    return data.assign(_frames(found, p))
-
-
-def _frames(found: Simulated, p: CoupledRotor) -> dict[str, xr.DataArray]:
-    """The inflow over the disk at up to _MOST_FRAMES instants, one save in a whole number."""
-    import jax
-
     count = found.flown.t.size
-    every = max(1, -(-count // _MOST_FRAMES))
-    at = np.arange(0, count, every)
-    r = np.linspace(float(sections_of(p).r[0]), float(sections_of(p).r[-1]), _RADII)
+    at = np.arange(0, count, max(1, -(-count // _MOST_FRAMES)))
+    data = data.assign(_frames(found, at))
+    return data.assign(wake_arrays(found, at)) if isinstance(p, CoupledWake) else data
+
+
+def _frames(found: Simulated, at: np.ndarray) -> dict[str, xr.DataArray]:
+    """The inflow over the disk at the saves `at`; in a free wake with what the blades themselves induce."""
+    p = found.start.p
+    r = np.linspace(float(stations(p)[0]), float(stations(p)[-1]), _RADII)
     psi = 2 * np.pi / _RAYS * np.arange(_RAYS)
     points = np.stack([r * np.cos(psi)[:, None], r * np.sin(psi)[:, None], 0 * r * psi[:, None]], axis=-1)
 
-    def field(row):
-        return -p.inflow.velocity(row[0], jnp.asarray(points), row[1])[..., 2]
-
-    rows = jax.tree.map(lambda v: v[at], (found.flown.x.inflow, found.flown.u))
-    fields = np.asarray(jax.jit(lambda rows: jax.lax.map(field, rows, batch_size=16))(rows))
+    rows = jax.tree.map(lambda v: v[at], (found.flown.x, found.flown.u))
+    fields = np.asarray(_fields(rows, jnp.asarray(points.reshape(-1, 3)), p)).reshape(-1, _RAYS, _RADII)
     coords = {"frame": at, "ray": ("ray", psi, {"units": "rad"}), "radius": r}
     attrs = {"long_name": "λ over ΩR, positive down"}
     return {"inflow": xr.DataArray(fields, coords, ("frame", "ray", "radius"), attrs=attrs)}
+
+
+@eqx.filter_jit
+def _fields(rows, points, p):
+    def field(row):
+        return -inflow_velocity(row[0], points, row[1], p)[..., 2]
+
+    return jax.lax.map(field, rows, batch_size=None if isinstance(p, CoupledWake) else 16)
 
 
 def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
@@ -97,11 +108,21 @@ def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
         "march_s": found.march_s,
         "march_s_per_revolution": found.march_s / turns,
         "real_time_factor": flown_s / found.march_s,
+        **_of_the_wake(data),
         "histories": {
             n: {"first": v[0], "last": v[-1], "min": float(np.min(v)), "max": float(np.max(v))}
             for n, v in series.items()
         },
     }
+
+
+def _of_the_wake(data: xr.Dataset) -> dict[str, Any]:
+    """How far a free wake has left itself: its change over the last revolution, and the largest."""
+    if "wake_change" not in data:
+        return {}
+    change = data["wake_change"].values
+    late = change[np.isfinite(change)]
+    return {} if not late.size else {"wake_change_last": float(late[-1]), "wake_change_max": float(late.max())}
 
 
 def histories(data: xr.Dataset) -> Figure:
@@ -118,7 +139,7 @@ def histories(data: xr.Dataset) -> Figure:
             flapping.plot(t, data["flap"].sel(coordinate=name), ls=line, label=rf"$\beta_{{{name}}}$")
         flapping.set(ylabel="flap, deg")
         for name, label, line in (("CT", r"$C_T$", "-"), ("CQ", r"$C_Q$", "--")):
-            turned = _over_a_turn(data[name].values)
+            turned = over_a_turn(data[name].values)
             loads.plot(t, turned / turned[0], ls=line, label=f"{label} / {turned[0]:.3e}")
         loads.set(xlabel="time, s", ylabel="mean over a revolution, over the first")
         for name in ("u", "v", "w"):
@@ -136,7 +157,7 @@ def histories(data: xr.Dataset) -> Figure:
     return figure
 
 
-def _over_a_turn(values: np.ndarray) -> np.ndarray:
+def over_a_turn(values: np.ndarray) -> np.ndarray:
     """Running mean over one revolution, the ends repeated."""
     kernel = np.ones(SAVES) / SAVES
     padded = np.concatenate([np.repeat(values[:SAVES].mean(), SAVES // 2), values, np.repeat(values[-1], SAVES - 1)])
@@ -144,21 +165,20 @@ def _over_a_turn(values: np.ndarray) -> np.ndarray:
     return np.convolve(padded, kernel, "valid")[: values.size]
 
 
-def animation(found: Simulated, data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -> None:
+def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -> None:
     """Write a GIF: blades from the side with their flapping drawn large, the inflow from above, thrust so far."""
     frames, psi = data["frame"].values, np.append(data["ray"].values, 2 * np.pi)
     fields = data["inflow"].values
     fields = np.concatenate([fields, fields[:, :1]], axis=1)
     r = data["radius"].values
     x, y = r * np.cos(psi)[:, None], r * np.sin(psi)[:, None]
-    large, thrust, t = 3.0, _over_a_turn(data["CT"].values), data["time"].values
-    with mpl.rc_context({**plotting.STYLE, "figure.dpi": 80}):  # type: ignore[arg-type]
-        figure = plotting.new_figure(9.0, 3.4)
+    large, thrust, t = 3.0, over_a_turn(data["CT"].values), data["time"].values
+
+    def build(figure: Figure) -> Any:
         side, disk, history = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.2))
         levels = plotting.shared_levels([fields])
         mesh = disk.pcolormesh(x, y, fields[0], shading="gouraud", vmin=levels[0], vmax=levels[-1], cmap="viridis")
         disk.set(aspect="equal", xticks=[], yticks=[], title="inflow from above", xlabel="forward ← → aft")
-        disk.invert_yaxis()
         disk.grid(visible=False)
         figure.colorbar(mesh, ax=disk, shrink=0.7, label=r"$\lambda$")
         spokes = [disk.plot([], [], color="white", lw=1.2)[0] for _ in data["blade"]]
@@ -172,7 +192,7 @@ def animation(found: Simulated, data: xr.Dataset, path: str | Path, frames_per_s
         blades = [side.plot([], [], color=plotting.INK, lw=2)[0] for _ in data["blade"]]
         (floor,) = side.plot([], [], color="#888888", lw=3)
 
-        def draw(frame: int) -> list[Any]:
+        def draw(frame: int) -> None:
             at = int(frames[frame])
             mesh.set_array(fields[frame])
             for k, (blade, spoke) in enumerate(zip(blades, spokes, strict=True)):
@@ -184,11 +204,7 @@ def animation(found: Simulated, data: xr.Dataset, path: str | Path, frames_per_s
                 floor.set_data([-1.15, 1.15], 2 * [-float(data["height"][at])])
             dot.set_data([t[at]], [thrust[at]])
             side.set_title(f"t = {t[at]:.2f} s, flapping ×{large:g}")
-            return [mesh, dot]
 
-        draw(0)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # laid out once, not again for each frame
-        film = FuncAnimation(figure, draw, frames=len(frames), blit=False)
-        with whole_file(path) as temporary:
-            film.save(temporary, writer=PillowWriter(fps=frames_per_second))
+        return draw
+
+    write_film(path, build, len(frames), (9.0, 3.4), frames_per_second)

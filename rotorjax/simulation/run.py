@@ -12,16 +12,19 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.interpolate import PPoly
 
-from rotorjax.coupled import CoupledRotor, CoupledState, Outputs, output, rhs
+from rotorjax.coupled import Coupled, CoupledState, Outputs, output, rhs
+from rotorjax.coupled_wake import CoupledWake
 from rotorjax.errors import InputError
 from rotorjax.inflow.choice import LOWEST
 from rotorjax.ode.trajectory import Trajectory, march
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor import catalogue
+from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.simulation.case import SimulationCase, steps_of
+from rotorjax.simulation.case import FREE_WAKE, SimulationCase, steps_of
 from rotorjax.simulation.history import Piecewise, piecewise
-from rotorjax.trim.problem import inputs_at
-from rotorjax.trim.run import Result
-from rotorjax.trim.run import run as run_trim
+from rotorjax.simulation.start import Start, start_of
+from rotorjax.simulation.step import instant, steps_per_turn
 
 SAVES = 12  # of a revolution
 Progress = Callable[[str], None]
@@ -61,7 +64,7 @@ class Simulated:
     """A flight. march_s: seconds of the march without compilation; finished, why: how it ended."""
 
     case: SimulationCase
-    start: Result
+    start: Start
     flown: Flown
     driver: Driver
     steps: int
@@ -70,36 +73,44 @@ class Simulated:
     why: str
 
 
-def driven(t: Float[Array, ""], x: CoupledState, driver: Driver, p: CoupledRotor) -> CoupledState:
+def driven(t: Float[Array, ""], x: CoupledState, driver: Driver, p: Coupled) -> CoupledState:
     """Rate of the coupled rotor under the histories."""
     return rhs(t, x, driver(t), p)
 
 
-def driver_of(case: SimulationCase, start: Result) -> Driver:
+def driver_of(case: SimulationCase, start: Start) -> Driver:
     """Histories in rotor units. Raises InputError where the hub's path takes the disk into the ground."""
-    p, inputs = start.p, inputs_at(start.z.controls, start.flight)
-    omega, tip = float(p.operating.omega), float(p.operating.tip_speed(p.rotor.radius))
+    scaled = _in_rotor_units(case, start.p.rotor, start.p.operating)
+    height = None
+    if start.inputs.height is not None:
+        height = piecewise(hub_path(case, start.p.rotor, start.p.operating, start.tilt))
+    return Driver(start.inputs, piecewise(scaled), piecewise(scaled.derivative()), height)
+
+
+def _in_rotor_units(case: SimulationCase, rotor: Rotor, operating: OperatingPoint) -> PPoly:
+    omega, tip = float(operating.omega), float(operating.tip_speed(rotor.radius))
     turn = np.pi / 180
     units = np.array([turn, turn, turn, 1 / tip, 1 / tip, 1 / tip, turn / omega, turn / omega, turn / omega, 0.01])
     told = case.polynomials()
     powers = omega ** -np.arange(told.c.shape[0] - 1, -1, -1.0)  # from seconds to Ω_ref t
-    scaled = PPoly(told.c * powers[:, None, None] * units, told.x * omega)
-    height = None
-    if start.flight.height is not None:
-        tilt = float(start.z.controls.tilt)
-        up = scaled.c @ np.array([0, 0, 0, np.sin(tilt), 0, -np.cos(tilt), 0, 0, 0, 0])
-        path = PPoly(up[..., None], scaled.x).antiderivative()
-        path.c[-1] += float(start.flight.height)
-        _check_clear(path, case, start, omega, tilt)
-        height = piecewise(path)
-    return Driver(inputs, piecewise(scaled), piecewise(scaled.derivative()), height)
+    return PPoly(told.c * powers[:, None, None] * units, told.x * omega)
 
 
-def _check_clear(path: PPoly, case: SimulationCase, start: Result, omega: float, tilt: float) -> None:
+def hub_path(case: SimulationCase, rotor: Rotor, operating: OperatingPoint, tilt: float) -> PPoly:
+    """Height of the hub over Ω_ref t, over R; tilt of the shaft in rad.
+
+    Raises InputError where there is no ground, or the path takes the disk into it.
+    """
+    if case.request.height is None:
+        raise InputError("[flight] height must be given for a path over ground, but is missing")
+    scaled, omega = _in_rotor_units(case, rotor, operating), float(operating.omega)
+    up = scaled.c @ np.array([0, 0, 0, np.sin(tilt), 0, -np.cos(tilt), 0, 0, 0, 0])
+    path = PPoly(up[..., None], scaled.x).antiderivative()
+    path.c[-1] += case.request.height
     t = np.linspace(0.0, case.duration * omega, 2001)
-    lowest = abs(np.sin(tilt)) + np.tan(np.deg2rad(start.request.slope_deg))
+    lowest = abs(np.sin(tilt)) + np.tan(np.deg2rad(case.request.slope_deg))
     why = "where the disk cuts the ground"
-    if start.request.inflow != "vpbfsm" and lowest < LOWEST:
+    if case.request.inflow not in ("vpbfsm", FREE_WAKE) and lowest < LOWEST:
         lowest, why = LOWEST, "the lowest that Cheeseman and Bennett's source is good for"
     under = np.flatnonzero(path(t)[:, 0] <= lowest)
     if under.size:
@@ -107,32 +118,38 @@ def _check_clear(path: PPoly, case: SimulationCase, start: Result, omega: float,
             f"[history] the hub's path must stay above {lowest:.3g} R, {why}, "
             f"but goes below it at {t[under[0]] / omega:.2f} s"
         )
+    return path
 
 
 def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
     """Trim, check the path and march. Raises InputError where the case cannot be flown or does not trim."""
     report = progress or (lambda stage: None)
+    request = case.request
+    if request.height is not None and request.drag_area is None:  # said before the trim's work
+        hub_path(case, *catalogue.load(request.rotor), float(np.deg2rad(request.tilt_deg)))
     report("trim")
-    start = run_trim(case.request)
-    if not start.trimmed.outcome.converged:
-        raise InputError(f"[flight] must be a flight that can be trimmed, but: {start.trimmed.outcome.why}")
-    driver = driver_of(case, start)
-    p = start.p
+    return fly_from(case, start_of(case, report), report)
+
+
+def fly_from(case: SimulationCase, start: Start, progress: Progress | None = None) -> Simulated:
+    """March from a start. Raises InputError where the hub's path takes the disk into the ground."""
+    report = progress or (lambda stage: None)
+    driver, p = driver_of(case, start), start.p
     omega = float(p.operating.omega)
-    steps = steps_of(case, omega)
-    x = CoupledState(jnp.zeros(()), *jax.tree.map(lambda v: v[0], (start.z.rotor, start.z.inflow)))
-    every = case.steps_per_turn // SAVES
+    per_turn = steps_per_turn(case, start)
+    steps = steps_of(case, omega, per_turn)
+    every = per_turn // SAVES
     steps -= steps % every
-    dt = 2 * np.pi / case.steps_per_turn
+    dt = 2 * np.pi / per_turn
 
     def go(count: int, show: bool) -> Trajectory:
-        return march(driven, x, 0.0, dt, count, driver, p, save_every=every, progress=show)
+        return march(driven, start.x, 0.0, dt, count, driver, p, save_every=every, progress=show)
 
     report("compile the march")
     go(every, False)
     report("march")
     begun = time.perf_counter()
-    found = go(steps, False)
+    found = go(steps, progress is not None and isinstance(p, CoupledWake))
     jax.block_until_ready(found.x)
     spent = time.perf_counter() - begun
     report("outputs")
@@ -140,8 +157,21 @@ def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
     return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why)
 
 
+def _outputs(t: Float[Array, " T"], x: CoupledState, driver: Driver, p: Coupled) -> tuple[RotorInputs, Outputs]:
+    """Inputs and outputs along a march: many instants at once, or those of a free wake one by one."""
+    if not isinstance(p, CoupledWake):
+        return _at_once(t, x, driver, p)
+    u = _inputs(t, driver)
+    rows = (jax.tree.map(lambda v, k=k: v[k], (x, u)) for k in range(t.size))
+    found = [instant(state, now, p)[1] for state, now in rows]
+    return u, jax.tree.map(lambda *v: jnp.stack(v), *found)
+
+
+_inputs = eqx.filter_jit(lambda t, driver: jax.lax.map(driver, t))
+
+
 @eqx.filter_jit
-def _outputs(t, x, driver, p) -> tuple[RotorInputs, Outputs]:
+def _at_once(t, x, driver, p) -> tuple[RotorInputs, Outputs]:
     def at(row):
         now, state = row
         u = driver(now)

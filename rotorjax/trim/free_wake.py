@@ -14,13 +14,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.coupled_wake import wake_air_loads
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.rotor import flap_lag
 from rotorjax.rotor.flap_lag import Blade
 from rotorjax.rotor.hub import RotorInputs, turning_frame
+from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluate, spread, transported
-from rotorjax.wake.field import carried
-from rotorjax.wake.model import Flight, FreeWake
+from rotorjax.wake.model import Flight, FreeWake, azimuths
 from rotorjax.wake.start import prescribed
 from rotorjax.wake.transport import harmonics
 
@@ -37,17 +38,6 @@ class InWake(NamedTuple):
     wake: Unknowns
     flap: Float[Array, " K"]
     controls: Float[Array, "3"]
-
-
-class Loads(NamedTuple):
-    """Of each slice's blade. force (K, R, 3): per length over ρΩ²R³, in the frame of the slice. moment (K, 3): ∫ s f ds
-    about the flap hinge over ρΩ²R⁵. induced, profile (K,): power into the induced velocity and into drag, over ρΩ³R⁵.
-    """
-
-    force: Float[Array, "K R 3"]
-    moment: Float[Array, "K 3"]
-    induced: Float[Array, " K"]
-    profile: Float[Array, " K"]
 
 
 class WakeTrim(eqx.Module):
@@ -76,36 +66,17 @@ def residual(z: InWake, p: WakeTrim) -> InWake:
     found = evaluate(model, z.wake)
     wake = jax.tree.map(lambda new, old: new - old, transported(model, found), z.wake)
     loads = loads_of(model, found)
-    return InWake(wake, _flap_defect(z.flap, loads, p), _trim_defect(z, loads, p))
+    return InWake(wake, flap_defect(z.flap, loads, p), _trim_defect(z, loads, p))
 
 
-def loads_of(model: FreeWake, found: Evaluation) -> Loads:
-    """Air loads of the blades in a wake."""
-    flight, loads = model.flight, found.loads
-    assert flight is not None
-    slices = flight.flap.shape[0]
-    flap = flight.flap[:, None]
-    zero = jnp.zeros_like(flap)
-    up = jnp.stack([-jnp.sin(flap), zero, jnp.cos(flap)], axis=-1)
-    ahead = jnp.array([0.0, 1.0, 0.0])
-    sine, cosine = jnp.sin(loads.inflow_angle)[..., None], jnp.cos(loads.inflow_angle)[..., None]
-    lift, drag = loads.dlift[..., None], loads.ddrag[..., None]
-    force = (lift * cosine - drag * sine) * up - (lift * sine + drag * cosine) * ahead
-    arm = model.stations - flight.hinge
-    psi = 2 * jnp.pi / slices * jnp.arange(slices)
-    own = found.velocities.control - jax.vmap(lambda angle: carried(model, angle))(psi)[:, None]
-    speed = loads.mach / model.operating.tip_mach(model.rotor.radius)
-    return Loads(
-        force,
-        jnp.einsum("r,krc->kc", model.widths * arm, force),
-        -jnp.einsum("r,krc,krc->k", model.widths, force, own),
-        jnp.einsum("r,kr,kr->k", model.widths, loads.ddrag, speed),
-    )
+def loads_of(model: FreeWake, found: Evaluation) -> AirLoads:
+    """Air loads of the blades in a wake, leading axis K."""
+    return wake_air_loads(model, found.velocities.control, found.loads, azimuths(found.state))
 
 
-def thrust_of(loads: Loads, p: WakeTrim) -> Float[Array, ""]:
+def thrust_of(loads: AirLoads, p: WakeTrim) -> Float[Array, ""]:
     """C_T along the shaft."""
-    return p.model.rotor.blades / jnp.pi * jnp.mean(loads.force[..., 2] @ p.model.widths)
+    return p.model.rotor.blades / jnp.pi * jnp.mean(loads.force[:, 2])
 
 
 def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
@@ -117,7 +88,7 @@ def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
     return jnp.stack([jnp.mean(flap), 2 * jnp.mean(flap * jnp.cos(psi)), 2 * jnp.mean(flap * jnp.sin(psi))])
 
 
-def _trim_defect(z: InWake, loads: Loads, p: WakeTrim) -> Float[Array, "3"]:
+def _trim_defect(z: InWake, loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
     """Thrust wanted less thrust, as an angle; cyclic flapping, which cyclic pitch answers a quarter turn later."""
     short = THRUST_STEP * (1 - thrust_of(loads, p) / p.thrust)
     if z.flap.shape[0] == 1:
@@ -126,7 +97,7 @@ def _trim_defect(z: InWake, loads: Loads, p: WakeTrim) -> Float[Array, "3"]:
     return jnp.stack([short, -sine, cosine])
 
 
-def _flap_defect(flap: Float[Array, " K"], loads: Loads, p: WakeTrim) -> Float[Array, " K"]:
+def flap_defect(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, " K"]:
     """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap equation."""
     slices = flap.shape[0]
     psi = 2 * jnp.pi / slices * jnp.arange(slices)

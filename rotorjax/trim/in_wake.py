@@ -23,7 +23,8 @@ from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.trim.free_wake import InWake, Loads, WakeTrim, first_guess, flown, harmonic, loads_of, residual
+from rotorjax.rotor.moving_blade import AirLoads
+from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, harmonic, loads_of, residual
 from rotorjax.wake.equilibrium import Evaluation, evaluate
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
@@ -119,14 +120,14 @@ def means(found: TrimmedInWake) -> Means:
     def mean(power) -> float:
         return float(blades / jnp.pi * jnp.mean(power))
 
-    force = jnp.einsum("r,krc->kc", model.widths, loads.force)
+    force = loads.force
     along = force[:, 0] * jnp.cos(psi) - force[:, 1] * jnp.sin(psi)
     across = force[:, 0] * jnp.sin(psi) + force[:, 1] * jnp.cos(psi)
     hub = jnp.stack([along, across, force[:, 2]], axis=-1)
     del evaluation
     return Means(
         CT=mean(force[:, 2]),
-        CQ=mean(-(arm * loads.force[..., 1]) @ model.widths),
+        CQ=mean(-(arm * loads.per_length[..., 1]) @ model.widths),
         CP_induced=mean(loads.induced),
         CP_profile=mean(loads.profile),
         CP_parasite=mean(hub @ p.inputs.velocity),
@@ -135,7 +136,7 @@ def means(found: TrimmedInWake) -> Means:
 
 
 @eqx.filter_jit
-def evaluated(z: InWake, p: WakeTrim) -> tuple[Evaluation, Loads]:
+def evaluated(z: InWake, p: WakeTrim) -> tuple[Evaluation, AirLoads]:
     """Wake and air loads of unknowns."""
     model = flown(z, p)
     found = evaluate(model, z.wake)

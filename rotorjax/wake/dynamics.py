@@ -56,7 +56,7 @@ def blade_loads(
     downwash = gamma_bound @ chord_downwash(model.stations, model.edges, behind).T
     if model.flight is not None:
         flap, arm = model.flight.flap[:, None], model.stations - model.flight.hinge
-        tangential = model.flight.hinge + arm * jnp.cos(flap) - control[..., 1]
+        tangential = model.speed * (model.flight.hinge + arm * jnp.cos(flap)) - control[..., 1]
         normal = control[..., 2] * jnp.cos(flap) - control[..., 0] * jnp.sin(flap)
         perpendicular = arm * model.flight.flap_rate[:, None] - normal
         pitch = pitch + model.flight.cyclic[:, None]
@@ -90,16 +90,25 @@ def rhs(psi: float | Float[Array, ""], state: WakeState, inputs: WakeInputs, mod
 
 def rates(state: WakeState, velocities: Velocities, inputs: WakeInputs, model: FreeWake) -> WakeState:
     """Rate of change of the state in given velocities."""
-    near, far = operators(model)
-    start = jax.vmap(lambda s: releases(model, s))(state)
     wanted = blade_loads(model, velocities.control, state.gamma_bound, inputs).circulation
+    return carried_on(state, velocities, wanted, model)
+
+
+def carried_on(state: WakeState, velocities: Velocities, wanted: Float[Array, "K R"], model: FreeWake) -> WakeState:
+    """Rate of change of the state in given velocities, its bound circulation on the way to `wanted`.
+
+    Wake age and the filter count in azimuth, so that they go with the rotor's speed.
+    """
+    near, far = operators(model)
+    speed = model.speed
+    start = jax.vmap(lambda s: releases(model, s))(state)
     leading = leading_lines(model, state.near.shape[0])
     return WakeState(
-        near=velocities.near - _drift(near, state.near, leading),
-        far=velocities.far - _drift(far, state.far, start.points),
-        gamma_near=-_age_slope(near, state.gamma_near, state.gamma_bound),
-        gamma_far=-_age_slope(far, state.gamma_far, start.strength),
-        gamma_bound=(wanted - state.gamma_bound) / model.settings.circulation_lag,
+        near=velocities.near - speed * _drift(near, state.near, leading),
+        far=velocities.far - speed * _drift(far, state.far, start.points),
+        gamma_near=-speed * _age_slope(near, state.gamma_near, state.gamma_bound),
+        gamma_far=-speed * _age_slope(far, state.gamma_far, start.strength),
+        gamma_bound=speed * (wanted - state.gamma_bound) / model.settings.circulation_lag,
     )
 
 

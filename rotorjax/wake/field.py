@@ -66,9 +66,17 @@ def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> 
     return jax.lax.map(one, (jnp.arange(slices(state)), azimuths(state)))
 
 
+def velocity_now(
+    state: WakeState, psi: Float[Array, ""], points: Float[Array, "N 3"], model: FreeWake
+) -> Float[Array, "N 3"]:
+    """Induced velocity over ΩR at hub-frame points over R, at the one instant at which slice 0 stands at psi."""
+    turned = rotate_about_shaft(points, -psi)
+    return rotate_about_shaft(_induced(model, wake_segments(model, state, psi), turned, 0, psi), psi)
+
+
 def _at_slice(model, segments, targets, k, angle):
     """Induced velocity, climb, wind and the auxiliary washout at points in the frame of slice k."""
-    return _induced(model, segments, targets, k, angle) + carried(model, angle)
+    return _induced(model, segments, targets, k, angle) + undisturbed(model, targets, angle)
 
 
 def _induced(model: FreeWake, segments: Segments, targets: Float[Array, "N 3"], k, angle) -> Float[Array, "N 3"]:
@@ -99,6 +107,15 @@ def carried(model: FreeWake, angle: Float[Array, ""]) -> Float[Array, "3"]:
     """What the wake is carried by besides itself, in the frame at `angle`: climb, wind, the solver's auxiliary flow."""
     axial = jnp.zeros(3, model.climb.dtype).at[2].set(-model.climb - model.washout)
     return axial if model.flight is None else axial + rotate_about_shaft(model.flight.wind, -angle)
+
+
+def undisturbed(model: FreeWake, points: Float[Array, "N 3"], angle: Float[Array, ""]) -> Float[Array, "#N 3"]:
+    """Velocity of the air that no vortex moves, seen at points of the frame at `angle`: on a hub that turns, of each
+    point its own.
+    """
+    if model.flight is None or model.flight.turn is None:
+        return carried(model, angle)[None]
+    return carried(model, angle) - jnp.cross(rotate_about_shaft(model.flight.turn, -angle), points)
 
 
 def _sharpened(model: FreeWake, slice_: WakeState, points: Float[Array, "R 3"]) -> Float[Array, "R 3"]:

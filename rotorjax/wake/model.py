@@ -45,7 +45,8 @@ class Flight(eqx.Module):
 
     wind (3,): velocity of the air far away, seen from the hub, over ΩR, in the hub frame (x aft, z up); the operating
     point's climb comes on top. hinge: e/R of the flap hinge. flap, flap_rate (K,): of the blade of each slice (rad, per
-    rad). cyclic (K,): its pitch beyond collective and twist (rad).
+    rad). cyclic (K,): its pitch beyond collective and twist (rad). turn (3,): angular velocity of the hub over Ω, hub
+    frame; None for none. speed (): the rotor's speed over Ω, which stays the unit of velocities; None for 1.
     """
 
     wind: Float[Array, "3"]
@@ -53,6 +54,8 @@ class Flight(eqx.Module):
     flap: Float[Array, " K"]
     flap_rate: Float[Array, " K"]
     cyclic: Float[Array, " K"]
+    turn: Float[Array, "3"] | None = None
+    speed: Float[Array, ""] | None = None
 
 
 class FreeWake(eqx.Module):
@@ -116,6 +119,11 @@ class FreeWake(eqx.Module):
     def climb(self) -> Float[Array, ""]:
         """Climb velocity over ΩR."""
         return self.operating.climb_ratio(self.rotor.radius)
+
+    @property
+    def speed(self) -> float | Float[Array, ""]:
+        """Rotor speed over that of the operating point."""
+        return 1.0 if self.flight is None or self.flight.speed is None else self.flight.speed
 
     @property
     def viscosity(self) -> Float[Array, ""]:

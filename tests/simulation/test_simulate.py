@@ -13,6 +13,7 @@ from rotorjax.io import netcdf
 from rotorjax.simulation.case import COLUMNS, read_case, steps_of
 from rotorjax.simulation.history import piecewise, smooth
 from rotorjax.simulation.run import driver_of
+from rotorjax.simulation.start import from_trim
 from rotorjax.trim.run import Result, prepare
 from rotorjax.trim.solve import Trimmed, guess
 
@@ -72,9 +73,9 @@ def test_histories_are_scipys_monotone_cubics_with_their_rates():
 
 
 def started(case):
-    """A result that was not solved for: enough for its inputs."""
+    """A trim that was not solved for: enough for its inputs."""
     p, flight, residual = prepare(case.request)
-    return Result(case.request, p, flight, Trimmed(guess(p, flight), None, residual), 0.0)
+    return from_trim(Result(case.request, p, flight, Trimmed(guess(p, flight), None, residual), 0.0))
 
 
 def test_inputs_of_a_descent(tmp_path):
@@ -93,7 +94,7 @@ def test_inputs_of_a_descent(tmp_path):
     now, step = 0.1 * omega, 1e-5
     slope = (driver(jnp.asarray(now + step)).w - driver(jnp.asarray(now - step)).w) / (2 * step)
     assert float(driver(jnp.asarray(now)).w_rate) == pytest.approx(float(slope), rel=1e-6)
-    assert steps_of(case, omega) % 12 == 0
+    assert steps_of(case, omega, 72) % 12 == 0
 
 
 def test_a_path_into_the_ground_is_refused(tmp_path):

@@ -10,10 +10,12 @@ from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.hub import rotor_inputs
+from rotorjax.simulation.start import from_wake
+from rotorjax.simulation.step import instant
 from rotorjax.trim.dispatch import check_request
 from rotorjax.trim.free_wake import residual
 from rotorjax.trim.in_wake import means, trim_in_wake, wake_trim
-from rotorjax.trim.in_wake_run import run_in_wake, wake_numbers
+from rotorjax.trim.in_wake_run import WakeResult, run_in_wake, wake_numbers
 from rotorjax.trim.run import Request
 from rotorjax.wake.settings import flight_settings, wake_settings
 
@@ -73,7 +75,7 @@ def test_residual_has_the_derivative_of_finite_differences(cruise):
 
 
 @pytest.mark.slow
-def test_hover_needs_no_cyclic():
+def test_hover_needs_no_cyclic_and_is_a_steady_state_of_the_coupled_rotor():
     settings = wake_settings(panels=8, age_step_deg=20.0, near_wake_deg=100.0, free_turns=3.0, closure_turns=3)
     p = wake_trim(*load("uh60"), rotor_inputs(), THRUST, settings=settings)
     found = trim_in_wake(p, jnp.array([0.31, 0.0, 0.0]), 0.05)
@@ -83,6 +85,12 @@ def test_hover_needs_no_cyclic():
     assert flown.CP_induced + flown.CP_profile == pytest.approx(flown.CQ, rel=1e-6)
     assert flown.CP_parasite == 0
     assert 0.04 < flown.flap[0] < 0.07
+    start = from_wake(WakeResult(Request("uh60", THRUST, "freewake"), found, 0.0, 0.0))
+    rates, out = instant(start.x, start.inputs, start.p)
+    still = (rates.rotor, rates.inflow)
+    assert max(float(jnp.max(jnp.abs(leaf))) for leaf in jax.tree.leaves(still)) < 1e-6
+    assert float(out.CT) == pytest.approx(THRUST, rel=1e-6)
+    assert float(out.CQ) == pytest.approx(flown.CQ, rel=1e-6)
 
 
 def test_what_the_free_wake_cannot_do_is_refused():

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.wake.dynamics import blade_loads, inputs_of
-from rotorjax.wake.equilibrium import evaluated, spread
-from rotorjax.wake.field import carried
+from rotorjax.wake.dynamics import blade_loads, carried_on, inputs_of
+from rotorjax.wake.equilibrium import evaluated, full_state, spread
+from rotorjax.wake.field import Velocities, carried, undisturbed
 from rotorjax.wake.model import Flight, free_wake, on_blade
 from rotorjax.wake.settings import flight_settings
 from rotorjax.wake.start import prescribed
@@ -89,3 +89,42 @@ def test_the_wind_is_seen_from_the_turning_blade(still):
     model = flying(still, (0.2, 0.0, 0.0))
     np.testing.assert_allclose(carried(model, jnp.asarray(0.0)), [0.2, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(carried(model, jnp.asarray(np.pi / 2)), [0.0, -0.2, 0.0], atol=1e-15)
+
+
+def test_a_hub_that_turns_about_its_shaft_turns_its_blades(still):
+    """A hub that turns by 0.05 and a rotor that turns on it by 0.95: as fast through the air as one that turns by 1."""
+    flap = jnp.full(SLICES, 0.1)
+    here = flying(still, (0.2, 0.0, 0.0), flap=flap)
+    turn = jnp.array([0.0, 0.0, 0.05])
+    there = eqx.tree_at(
+        lambda m: (m.flight.turn, m.flight.speed), here, (turn, jnp.asarray(0.95)), is_leaf=lambda v: v is None
+    )
+    gamma, angle = jnp.full((SLICES, 5), 0.01), jnp.asarray(0.3)
+
+    def loads(model):
+        air = undisturbed(model, model.of_slice(0).control, angle)
+        return blade_loads(model, jnp.broadcast_to(air, (SLICES, 5, 3)), gamma, inputs_of(model))
+
+    close(loads(here), loads(there))
+
+
+def test_air_at_rest_goes_round_a_hub_that_rolls(still):
+    """The point ahead of a hub that turns about x by q is passed by air at −q × r, seen from the blade at 90° too."""
+    rolling = eqx.tree_at(
+        lambda m: m.flight.turn, flying(still), jnp.array([0.1, 0.0, 0.0]), is_leaf=lambda v: v is None
+    )
+    starboard = jnp.array([[1.0, 0.0, 0.0]])  # of the blade's frame
+    np.testing.assert_allclose(undisturbed(rolling, starboard, jnp.asarray(np.pi / 2)), [[0, 0, -0.1]], atol=1e-15)
+    np.testing.assert_allclose(undisturbed(rolling, starboard, jnp.asarray(0.0)), 0, atol=1e-15)
+
+
+def test_wake_age_goes_with_the_rotors_speed(still, wake):
+    """Rates less the air's velocity, and those of strengths, are in proportion to Ω."""
+    slow = eqx.tree_at(lambda m: m.flight.speed, flying(still), jnp.asarray(0.9), is_leaf=lambda v: v is None)
+    state = full_state(still, wake)[0]
+    rest = Velocities(jnp.zeros((SLICES, 5, 3)), 0 * state.near, 0 * state.far)
+    wanted = 2 * state.gamma_bound
+    here, there = carried_on(state, rest, wanted, flying(still)), carried_on(state, rest, wanted, slow)
+    close(there, jax.tree.map(lambda v: 0.9 * v, here))
+    blown = carried_on(state, rest._replace(far=rest.far + 0.01), wanted, slow)
+    close(blown.far - there.far, jnp.full_like(state.far, 0.01))

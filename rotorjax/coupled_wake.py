@@ -1,0 +1,134 @@
+"""Blades in their own free wake: the wake's part of the coupled rotor (coupled.py), and their loads in it.
+
+The wake knows where the blades are by `wake.model.Flight`, made from the rotor's state and inputs at each instant; the
+loads are those of the wake's lifting line, at its own stations. That line does not lag, so neither do the blades: the
+lag hinge is held, and hands its moment to the hub.
+"""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rotorjax.frames import to_ellipsoidal
+from rotorjax.ground import Plane
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.blade_element import SectionLoads
+from rotorjax.rotor.flap_lag import Blade, blade_of
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.rotor.hub import RotorInputs
+from rotorjax.rotor.moving_blade import AirLoads
+from rotorjax.wake.dynamics import WakeInputs, blade_loads, carried_on, driven
+from rotorjax.wake.field import node_velocities, undisturbed, velocity_now
+from rotorjax.wake.model import Flight, FreeWake, WakeState
+from rotorjax.wake.settings import WakeSettings
+
+
+class CoupledWake(eqx.Module):
+    """Parameters p of a rotor in its free wake, all leaves differentiable. ground: or None for none.
+
+    The state's inflow is a `WakeState` of K = B slices, blade 0 first. Climb comes from the hub's motion, not from the
+    operating point.
+    """
+
+    rotor: Rotor
+    operating: OperatingPoint
+    blade: Blade
+    ground: Plane | None
+    settings: WakeSettings
+
+    @property
+    def edges(self) -> Float[Array, " R+1"]:
+        """Panel edges of the lifting line, over R."""
+        return self._rigid.edges
+
+    @property
+    def stations(self) -> Float[Array, " R"]:
+        """Control points of the lifting line, over R."""
+        return self._rigid.stations
+
+    @property
+    def _rigid(self) -> FreeWake:
+        """The free wake's model without hub and blade motion; any climb belongs to the hub's motion."""
+        still = eqx.tree_at(lambda o: o.climb, self.operating, jnp.zeros_like(self.operating.climb))
+        return FreeWake(self.rotor, still, self.ground, self.settings, jnp.zeros(()))
+
+
+class BladesAt(NamedTuple):
+    """The blades at one instant. psi (B,): azimuths. flap, flap_rate (B,): rad, per rad. theta (B,): pitch without
+    twist (rad).
+    """
+
+    psi: Float[Array, " B"]
+    flap: Float[Array, " B"]
+    flap_rate: Float[Array, " B"]
+    theta: Float[Array, " B"]
+
+
+def coupled_wake(
+    rotor: Rotor, operating: OperatingPoint, settings: WakeSettings, ground: Plane | None = None
+) -> CoupledWake:
+    """Couple a rotor with its free wake. Raises InputError where the rotor has no hinge data."""
+    return CoupledWake(rotor, operating, blade_of(rotor, operating), ground, settings)
+
+
+def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
+    """The free wake's model at one instant: wind, turning and height from the hub's motion, flap and pitch of the
+    blades.
+    """
+    turn = to_ellipsoidal(jnp.stack([u.p, u.q, u.r]))
+    flight = Flight(-u.velocity, p.blade.offset, blades.flap, blades.flap_rate, blades.theta - u.theta_0, turn, u.omega)
+    model = eqx.tree_at(lambda m: m.flight, p._rigid, flight, is_leaf=lambda v: v is None)
+    return driven(model, _inputs(u))
+
+
+def in_wake(state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake) -> tuple[AirLoads, WakeState]:
+    """Air loads of all blades, leading axis B, and the rate of the wake, per radian of Ω_ref t."""
+    model = model_of(u, blades, p)
+    velocities = node_velocities(model, state, blades.psi[0])
+    loads = blade_loads(model, velocities.control, state.gamma_bound, _inputs(u))
+    air = wake_air_loads(model, velocities.control, loads, blades.psi)
+    return air, carried_on(state, velocities, loads.circulation, model)
+
+
+def velocity_in(
+    state: WakeState, points: Float[Array, "N 3"], u: RotorInputs, blades: BladesAt, p: CoupledWake
+) -> Float[Array, "N 3"]:
+    """Velocity that wake and bound vortices induce at hub-frame points over R, over Ω_ref R."""
+    return velocity_now(state, blades.psi[0], points, model_of(u, blades, p))
+
+
+def wake_air_loads(
+    model: FreeWake, control: Float[Array, "K R 3"], loads: SectionLoads, psi: Float[Array, " K"]
+) -> AirLoads:
+    """Sum up section loads along the lifting lines of K slices at azimuths psi; every field gets a leading axis K.
+
+    control: velocity of the air at the control points, in the blades' frames, over ΩR. Moments are about the hinge.
+    """
+    flight = model.flight
+    assert flight is not None
+    flap = flight.flap[:, None]
+    zero = jnp.zeros_like(flap)
+    up = jnp.stack([-jnp.sin(flap), zero, jnp.cos(flap)], axis=-1)
+    ahead = jnp.array([0.0, 1.0, 0.0])
+    sine, cosine = jnp.sin(loads.inflow_angle)[..., None], jnp.cos(loads.inflow_angle)[..., None]
+    lift, drag = loads.dlift[..., None], loads.ddrag[..., None]
+    force = (lift * cosine - drag * sine) * up - (lift * sine + drag * cosine) * ahead
+    arm = model.stations - flight.hinge
+    passing = jax.vmap(lambda k, angle: undisturbed(model, model.of_slice(k).control, angle))
+    own = control - passing(jnp.arange(flap.shape[0]), psi)
+    speed = loads.mach / model.operating.tip_mach(model.rotor.radius)
+    return AirLoads(
+        force,
+        jnp.einsum("r,krc->kc", model.widths, force),
+        jnp.einsum("r,krc->kc", model.widths * arm, force),
+        -jnp.einsum("r,krc,krc->k", model.widths, force, own),
+        jnp.einsum("r,kr,kr->k", model.widths, loads.ddrag, speed),
+        loads,
+    )
+
+
+def _inputs(u: RotorInputs) -> WakeInputs:
+    return WakeInputs(u.theta_0, jnp.zeros_like(u.theta_0), u.height)

@@ -1,0 +1,33 @@
+"""The files that a flight leaves behind."""
+
+from pathlib import Path
+from typing import Any
+
+from rotorjax import plotting
+from rotorjax.io import netcdf
+from rotorjax.io.atomic import write_json
+from rotorjax.simulation import output
+from rotorjax.simulation.run import Simulated
+from rotorjax.simulation.wake_output import write_vtk
+from rotorjax.simulation.wake_pictures import wake_film, wake_picture
+
+
+def write_all(found: Simulated, out: Path, *, animated: bool = False) -> dict[str, Any]:
+    """Write history.nc, report.json and histories.png; of a free wake wake.png and vtk/; if asked for animation.gif.
+
+    Returns the report. Raises InputError where a file cannot be written.
+    """
+    data = output.dataset(found)
+    netcdf.write(out / "history.nc", data)
+    told = output.report(found, data)
+    write_json(out / "report.json", told)
+    plotting.save(output.histories(data), out / "histories")
+    wake = "wake_filaments" in data
+    if wake:
+        write_vtk(out / "vtk", data)
+        plotting.save(wake_picture(data), out / "wake")
+    if animated and wake:
+        wake_film(data, output.over_a_turn(data["CT"].values), out / "animation.gif")
+    elif animated:
+        output.animation(data, out / "animation.gif")
+    return told
