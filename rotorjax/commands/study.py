@@ -17,7 +17,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         "not converge.",
     )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
-    parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake, no PDF")
+    parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake, rigid blades, no PDF")
+    parser.add_argument("--rigid", action="store_true", help="blades that do not flap")
     parser.add_argument("--heights", nargs="*", type=float, metavar="H", help="level heights over R")
     parser.add_argument("--slopes", nargs="*", type=float, metavar="DEG", help="slopes at h = 1, in degrees")
     add_rotor(parser)
@@ -41,7 +42,12 @@ def run(chosen: argparse.Namespace) -> int:
     calibration = None if chosen.calibration is None else load(chosen.calibration)
     changes = {} if calibration is None else calibration.wake_settings
     settings = study_settings(
-        chosen.rotor, chosen.collective, harmonics=chosen.harmonics, quick=chosen.quick, **changes
+        chosen.rotor,
+        chosen.collective,
+        harmonics=chosen.harmonics,
+        quick=chosen.quick,
+        flapping=not (chosen.rigid or chosen.quick),
+        **changes,
     )
     result = solve_cases(cases, settings, chosen.out)
     # a PDF's fonts take longer than its picture, and a first look needs none

@@ -8,6 +8,7 @@ import xarray as xr
 
 from rotorjax.study import finite_state
 from rotorjax.study.finite_state import FiniteStateResult, Stations
+from rotorjax.study.flapping import RIGID, flap_harmonics_deg
 from rotorjax.study.settings import StudySettings
 from rotorjax.study.wake_file import case_of, is_sound
 
@@ -116,7 +117,13 @@ def summary_entry(data: xr.Dataset, reference: float | None) -> dict[str, Any]:
         "inflow_rms_difference": None if reference is None else inflow_rms_difference(data, reference),
         "wall_time_s": float(data["wall_time_s"]),
         "compile_time_s": float(data["compile_time_s"]),
+        **({"flapping": _flapping_entry(data)} if "flap" in data else {}),
     }
+
+
+def _flapping_entry(data: xr.Dataset) -> dict[str, Any]:
+    angles = zip(("beta_0_deg", "beta_1c_deg", "beta_1s_deg"), flap_harmonics_deg(data), strict=True)
+    return dict(angles) | {name: float(data[name]) for name in RIGID}
 
 
 def _free_wake_entry(data: xr.Dataset) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from rotorjax.study.claim import Claim
 from rotorjax.study.claims import checks, paper_claims
 from rotorjax.study.dataset import present
 from rotorjax.study.divergence import where_they_part
+from rotorjax.study.flapping import flap_harmonics_deg
 from rotorjax.study.markdown import table
 from rotorjax.study.reading import Reading
 
@@ -26,6 +27,7 @@ def report(merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wal
         "# Rotor inflow in ground effect: free vortex wake and VPBFSM",
         _introduction(merged, wall_time_s),
         "## Cases\n\n" + _case_table(reading),
+        *(["## Flapping blades\n\n" + flapping_table(reading)] if "flap" in merged else []),
         *(["## Calibrated model\n\n" + _calibrated(reading)] if "calibrated_inflow" in merged else []),
         "## What both models must show\n\n" + _claim_table(checks(reading)),
         "## The paper's claims\n\n" + _claim_table(paper_claims(reading)),
@@ -46,12 +48,12 @@ def _introduction(merged: xr.Dataset, wall_time_s: float) -> str:
     settings = loads(merged.attrs["settings"])
     failed = [str(n) for n in merged["case"].to_numpy()[merged["converged"].to_numpy() == 0]]
     text = (
-        f"Rotor {settings['rotor']}, collective {settings['collective_deg']:g}°, rigid blades, hover. Each case is "
-        "solved with the free wake; its loading dC_T/dr̄(r̄, ψ) drives the VPBFSM, once with the paper's printed factor "
-        "(π/7)^(η²) on the r = j terms and once with the exact image of the rigid wake cylinder. All inflow is "
-        "induced, positive down, and divided by the free wake's area-weighted mean out of ground effect (OGE), "
-        f"{float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, 90° the "
-        "advancing, 180° the valley, 270° the retreating side.\n\n"
+        f"Rotor {settings['rotor']}, collective {settings['collective_deg']:g}°, {settings['blades']} blades, hover. "
+        "Each case is solved with the free wake; its loading dC_T/dr̄(r̄, ψ) drives the VPBFSM, once with the paper's "
+        "printed factor (π/7)^(η²) on the r = j terms and once with the exact image of the rigid wake cylinder. All "
+        "inflow is induced, positive down, and divided by the free wake's area-weighted mean out of ground effect "
+        f"(OGE), {float(merged['reference_inflow']):.5f} ΩR. C_T = T/(ρA(ΩR)²). ψ = 0° is aft and the mountain side, "
+        "90° the advancing, 180° the valley, 270° the retreating side.\n\n"
         f"{len(merged['case'])} cases. This run took {wall_time_s:.0f} s, finished cases taken as they were found; "
         f"the wakes took {float(merged['wall_time_s'].sum()):.0f} s when they were solved, two at a time. Peak memory "
         f"{peak_memory_gb():.2f} GB. "
@@ -84,6 +86,23 @@ def _case_table(reading: Reading) -> str:
         "0.25 ≤ r̄ ≤ 0.95, both inflows over the OGE mean."
     )
     return table(head, rows) + note
+
+
+def flapping_table(reading: Reading) -> str:
+    """What it changes that blades flap."""
+    head = ["case", "β₀/°", "β₁c/°", "β₁s/°", "C_T", "C_T, rigid", "C_Pi", "C_Pi, rigid"]
+    head += ["mean inflow/ΩR", "mean inflow/ΩR, rigid"]
+    names = ["CT", "rigid_CT", "CP_induced", "rigid_CP_induced", "free_wake_mean_inflow", "rigid_mean_inflow"]
+    rows = []
+    for case in present(reading.merged):
+        data = reading.merged.sel(case=case.name)
+        if np.all(np.isfinite(data["flap"])):
+            rows.append([case.label, *flap_harmonics_deg(data), *(reading.number(case, name) for name in names)])
+    return (
+        "Blades are free to flap about their hinges, on a hub that stays, with no cyclic pitch; inflow is taken normal "
+        "to them. β = β₀ + β₁c cos ψ + β₁s sin ψ, up positive. Each starts from the wake of rigid blades, the numbers "
+        "of which stand beside.\n\n" + table(head, rows)
+    )
 
 
 def _calibrated(reading: Reading) -> str:

@@ -15,6 +15,7 @@ from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder
 from rotorjax.study import wake_file
 from rotorjax.study.cases import Case, neighbour
+from rotorjax.study.flapping import with_flapping
 from rotorjax.study.record import add_finite_state
 from rotorjax.study.schedule import Schedule
 from rotorjax.study.settings import StudySettings, differences
@@ -106,7 +107,11 @@ def solve_case(
     near = neighbour(case, [other for other, data in done.items() if bool(data["converged"])])
     start = None if near is None else wake_file.to_solution(done[near], settings)
     solution = solver(wake_file.model_of(case, settings), start, progress)
-    return add_finite_state(wake_file.to_dataset(case, solution, settings), settings)
+    if settings.flapping:
+        data = with_flapping(case, solution, settings, progress)
+    else:
+        data = wake_file.to_dataset(case, solution, settings)
+    return add_finite_state(data, settings)
 
 
 def _reload(path: Path, settings: StudySettings) -> xr.Dataset:

@@ -26,6 +26,7 @@ class StudySettings:
     rotor, operating, wake: as the models take them. radial_terms: pressure terms of each harmonic (3: τ₁, τ₃, τ₅).
     harmonics: highest harmonic of the VPBFSM's loading and ground sources on a slope; level ground needs none.
     source_terms: ground source terms of each harmonic (seven leave 2 % of the flow on the ground, five 4 %).
+    flapping: whether the blades are free to flap.
     """
 
     rotor: Rotor
@@ -34,6 +35,7 @@ class StudySettings:
     radial_terms: int = 3
     harmonics: int = 1
     source_terms: int = 7
+    flapping: bool = False
 
     @property
     def collective_deg(self) -> float:
@@ -54,6 +56,7 @@ class StudySettings:
             "rotor": self.rotor.name,
             "rotor.digest": _digest(self.rotor),
             "collective_deg": round(self.collective_deg, 9),
+            "blades": "flapping" if self.flapping else "rigid",
             **air,
             "vpbfsm.radial_terms": self.radial_terms,
             "vpbfsm.harmonics": self.harmonics,
@@ -72,13 +75,14 @@ def study_settings(
     climb_ratio: float = 0.0,
     harmonics: int = 1,
     quick: bool = False,
+    flapping: bool = False,
     **wake: Any,
 ) -> StudySettings:
     """Make settings from plain values; `wake` overrides settings of the free wake.
 
     rotor: name in the catalogue or a TOML file. collective_deg: None takes the rotor file's (18 for the UH-60, the
-    paper's). climb_ratio: climb velocity over ΩR. quick: the coarser free wake. Raises InputError where a value is not
-    allowed.
+    paper's). climb_ratio: climb velocity over ΩR. quick: the coarser free wake. flapping: blades free to flap,
+    where the rotor has hinge data; rigid otherwise. Raises InputError where a value is not allowed.
     """
     check_number("climb", climb_ratio, -0.5, 0.5)
     if harmonics != int(harmonics) or not 1 <= harmonics <= 4:
@@ -92,7 +96,8 @@ def study_settings(
     if "azimuths" not in wake:  # a periodic wake holds a whole number of slices for each blade
         default = (quick_settings if quick else wake_settings)().azimuths
         wake["azimuths"] = body.blades * -(-default // body.blades)
-    return StudySettings(body, operating, (quick_settings if quick else wake_settings)(**wake), harmonics=harmonics)
+    numbers = (quick_settings if quick else wake_settings)(**wake)
+    return StudySettings(body, operating, numbers, harmonics=harmonics, flapping=flapping and body.hinge is not None)
 
 
 def differences(ours: dict[str, Any], theirs: dict[str, Any]) -> list[str]:

@@ -21,9 +21,13 @@ class Performance(NamedTuple):
 
 
 def performance(model: FreeWake, found: Evaluation) -> Performance:
-    """Performance of the rotor in a wake, mean over its azimuths; the cut-out counts with the innermost inflow."""
-    inflow = -found.velocities.control[..., 2]
+    """Performance of the rotor in a wake, mean over its azimuths."""
+    mean = disk_mean(model, -found.velocities.control[..., 2])
+    return Performance(*rotor_coefficients(model.rotor, found.loads, model.stations, model.widths), mean)
+
+
+def disk_mean(model: FreeWake, inflow: Float[Array, "K R"]) -> Float[Array, ""]:
+    """Area-weighted mean of an inflow at the control points; the cut-out counts with the innermost value."""
     edges = model.edges
     area = jnp.diff(edges**2).at[0].add(edges[0] ** 2)
-    mean = jnp.mean(inflow, axis=0) @ area
-    return Performance(*rotor_coefficients(model.rotor, found.loads, model.stations, model.widths), mean)
+    return jnp.mean(inflow, axis=0) @ area

@@ -111,7 +111,7 @@ def solve(
         if x.near.shape[0] > slices:
             x = jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), x)
         here, x = search.move(here, model, spread(x, slices), "to the case")
-    return _read(here, x, search, clock)
+    return read(here, x, search, clock)
 
 
 def rehearse(model: FreeWake) -> Solution:
@@ -121,7 +121,7 @@ def rehearse(model: FreeWake) -> Solution:
     search = Search(tol=0.0, progress=None, ok=False, why="a rehearsal")
     search.prepare(model, x)
     search.newton(model, x, 0.0, effort=1)
-    return _read(model, x, search, Clock())
+    return read(model, x, search, Clock())
 
 
 def _fits(start: Solution, model: FreeWake) -> bool:
@@ -132,8 +132,8 @@ def _fits(start: Solution, model: FreeWake) -> bool:
     return same and jax.tree.structure(a.rotor) == jax.tree.structure(b.rotor)
 
 
-def _read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
-    """Evaluate the wake and collect what a user wants of it."""
+def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
+    """Evaluate the wake that a search ended with, and collect what a user wants of it."""
     found: Evaluation = evaluated(model, x)
     moved = transported(model, found)
     once_more = evaluated(model, moved)

@@ -1,0 +1,45 @@
+"""A case of the study with blades that flap, beside the rigid ones it starts from."""
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from rotorjax.study import wake_file
+from rotorjax.study.cases import Case
+from rotorjax.study.settings import StudySettings
+from rotorjax.trim.held import Flapped, let_flap
+from rotorjax.wake.search import Progress
+from rotorjax.wake.solution import Solution
+
+RIGID = {
+    "rigid_CT": ("CT", "rigid blades: thrust coefficient T/(ρA(ΩR)²)"),
+    "rigid_CP_induced": ("CP_induced", "rigid blades: induced part of the power coefficient"),
+    "rigid_mean_inflow": ("mean_inflow", "rigid blades: area-weighted mean induced inflow over ΩR"),
+}
+
+
+def with_flapping(case: Case, rigid: Solution, settings: StudySettings, progress: Progress | None = None) -> xr.Dataset:
+    """Pack a solution with its blades freed, where it converged; numbers of the rigid blades go along.
+
+    The wake's state stays that of the rigid blades, from which a neighbouring case starts.
+    """
+    if not rigid.converged:
+        return wake_file.to_dataset(case, rigid, settings)
+    flapped: Flapped = let_flap(rigid, progress)
+    data = wake_file.to_dataset(case, replace(flapped.solution, state=rigid.state), settings)
+    about = "flap angle of the blade at this azimuth in rad, up positive"
+    data["flap"] = ("azimuth", flapped.flap, {"units": "rad", "long_name": about})
+    climb = {"mean_inflow": settings.climb_ratio}
+    for name, (attribute, about) in RIGID.items():
+        value = getattr(rigid, attribute) - climb.get(attribute, 0.0)
+        data[name] = ((), value, {"units": "1", "long_name": about})
+    return data
+
+
+def flap_harmonics_deg(data: xr.Dataset) -> tuple[float, float, float]:
+    """β₀, β₁c, β₁s of a case in degrees."""
+    flap, psi = np.rad2deg(data["flap"].to_numpy()), data["azimuth"].to_numpy()
+    if flap.size == 1:
+        return float(flap[0]), 0.0, 0.0
+    return float(np.mean(flap)), float(2 * np.mean(flap * np.cos(psi))), float(2 * np.mean(flap * np.sin(psi)))
