@@ -53,7 +53,7 @@ def cut_off(points: jax.Array, segments: Segments, ground: PartialGround) -> jax
 @eqx.filter_jit
 def left_by_images(segments: Segments, ground: PartialGround) -> jax.Array:
     """Flow through the region that cut-off images leave, rms over the wake's own there, within 2 R of the shaft."""
-    at = jnp.asarray(np.c_[CHECK, np.full(len(CHECK), -float(ground.plane.height))])
+    at = jnp.concatenate([jnp.asarray(CHECK), jnp.full((len(CHECK), 1), -1.0) * ground.plane.height], axis=1)
     own, images = (segment_velocity(at, *part)[:, 2] for part in (segments, clipped(segments, ground)))
     solid = ground.mask(at)
     return jnp.sqrt(jnp.sum(solid * (own - images) ** 2) / jnp.sum(solid * own**2))
@@ -125,7 +125,7 @@ def main() -> None:
             first.plot(EDGES, shares[:, 1], ":", color=plotting.FREE_WAKE, label="free wake, images cut off")
             first.plot(EDGES, finite_state(options.height), color=plotting.VPBFSM, label="finite states")
             first.set(xlabel="edge aft of the hub, x/R", ylabel="upflow over that of the whole ground")
-            first.legend()
+            first.legend(loc="lower right")
             second.plot(EDGES, shares[:, 0], ":", color=plotting.FREE_WAKE)
             second.set(xlabel="edge aft of the hub, x/R", ylabel="cut-off images: left on the region, rms")
         plotting.save(figure, options.out / "partial_ground", ("png",))
