@@ -20,6 +20,7 @@ from rotorjax.rotor import flap_lag
 from rotorjax.rotor.flap_lag import Blade
 from rotorjax.rotor.hub import RotorInputs, turning_frame
 from rotorjax.rotor.moving_blade import AirLoads
+from rotorjax.trim.problem import Aim
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluate, spread, transported
 from rotorjax.wake.model import Flight, FreeWake, azimuths
 from rotorjax.wake.start import prescribed
@@ -41,12 +42,16 @@ class InWake(NamedTuple):
 
 
 class WakeTrim(eqx.Module):
-    """Parameters: the free wake (its collective and flight are replaced), the blade's inertia, hub motion and C_T."""
+    """Parameters: the free wake (its collective and flight are replaced), the blade's inertia, hub motion and C_T.
+
+    aim: what cyclic pitch is for (static).
+    """
 
     model: FreeWake
     blade: Blade
     inputs: RotorInputs
     thrust: Float[Array, ""]
+    aim: Aim = eqx.field(static=True, default="flapping")
 
 
 def flown(z: InWake, p: WakeTrim) -> FreeWake:
@@ -89,26 +94,49 @@ def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
 
 
 def _trim_defect(z: InWake, loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
-    """Thrust wanted less thrust, as an angle; cyclic flapping, which cyclic pitch answers a quarter turn later."""
+    """Thrust wanted less thrust, as an angle; cyclic flapping, which cyclic pitch answers a quarter turn later, or hub
+    moments over the wanted thrust.
+    """
     short = THRUST_STEP * (1 - thrust_of(loads, p) / p.thrust)
     if z.flap.shape[0] == 1:
         return jnp.stack([short, -z.controls[1], -z.controls[2]])
-    _, cosine, sine = harmonic(z.flap)
+    if p.aim == "moments":
+        cosine, sine = hub_moment(z.flap, loads, p)[1::-1] / p.thrust
+    else:
+        _, cosine, sine = harmonic(z.flap)
     return jnp.stack([short, -sine, cosine])
 
 
 def flap_defect(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, " K"]:
     """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap equation."""
-    slices = flap.shape[0]
-    psi = 2 * jnp.pi / slices * jnp.arange(slices)
-    frames = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity))(psi)
-    still = jnp.zeros_like(flap)
-    angles, rates = jnp.stack([flap, still], axis=-1), jnp.stack([_rate(flap), still], axis=-1)
-    wanted = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, angles, rates, loads.moment)[:, 0]
-    number = jnp.asarray(harmonics(slices))
-    left = jnp.fft.fft(wanted) + number**2 * jnp.fft.fft(flap)
+    _, _, wanted = _motion(flap, loads, p)
+    number = jnp.asarray(harmonics(flap.shape[0]))
+    left = jnp.fft.fft(wanted[:, 0]) + number**2 * jnp.fft.fft(flap)
     frequency = flap_lag.flap_frequency(p.blade)
     return jnp.fft.ifft(left / (frequency**2 - number**2 + 1j * DAMPING * number)).real
+
+
+def hub_moment(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
+    """Mean moment of air and inertia on the hub, in its frame, over ρA(ΩR)²R; one slice alone has no cyclic part."""
+    frames, (angles, rates), wanted = _motion(flap, loads, p)
+    held = wanted.at[:, 1].set(0.0)  # the lag hinge hands its moment on
+    found = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(frames, angles, rates, held, loads.force, loads.moment)
+    turned = rotate_about_shaft(found.moment, _azimuths(flap))
+    mean = p.model.rotor.blades / jnp.pi * jnp.mean(turned, axis=0)
+    return mean * jnp.array([0.0, 0.0, 1.0]) if flap.shape[0] == 1 else mean
+
+
+def _motion(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim):
+    """Turning frames, angles and rates, and accelerations of blades that flap and do not lag."""
+    frames = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity))(_azimuths(flap))
+    still = jnp.zeros_like(flap)
+    angles, rates = jnp.stack([flap, still], axis=-1), jnp.stack([_rate(flap), still], axis=-1)
+    wanted = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, angles, rates, loads.moment)
+    return frames, (angles, rates), wanted
+
+
+def _azimuths(flap: Float[Array, " K"]) -> Float[Array, " K"]:
+    return 2 * jnp.pi / flap.shape[0] * jnp.arange(flap.shape[0])
 
 
 def _rate(flap: Float[Array, " K"]) -> Float[Array, " K"]:

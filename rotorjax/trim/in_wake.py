@@ -5,7 +5,7 @@ from a prescribed one: Anderson's iteration and Newton with thick cores, then Ne
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -24,7 +24,8 @@ from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.rotor.moving_blade import AirLoads
-from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, harmonic, loads_of, residual
+from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, harmonic, hub_moment, loads_of, residual
+from rotorjax.trim.problem import Aim
 from rotorjax.wake.equilibrium import Evaluation, evaluate
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
@@ -56,7 +57,9 @@ class TrimmedInWake:
 
 @dataclass(frozen=True)
 class Means:
-    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s (rad)."""
+    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s (rad), moment (3,) on
+    the hub over ρA(ΩR)²R, hub frame.
+    """
 
     CT: float
     CQ: float
@@ -64,6 +67,7 @@ class Means:
     CP_profile: float
     CP_parasite: float
     flap: np.ndarray
+    moment: np.ndarray
 
 
 def wake_trim(
@@ -73,13 +77,14 @@ def wake_trim(
     thrust: float,
     ground: Plane | None = None,
     settings: WakeSettings | None = None,
+    aim: Aim = "flapping",
 ) -> WakeTrim:
     """Set a trim up. Raises InputError where the rotor has no hinge data, or as `free_wake` does."""
     if settings is None:
         settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     model = free_wake(rotor, still, ground, settings)
-    return WakeTrim(model, blade_of(rotor, operating), inputs, jnp.asarray(thrust, float))
+    return WakeTrim(model, blade_of(rotor, operating), inputs, jnp.asarray(thrust, float), aim)
 
 
 def windy(inputs: RotorInputs) -> bool:
@@ -132,6 +137,7 @@ def means(found: TrimmedInWake) -> Means:
         CP_profile=mean(loads.profile),
         CP_parasite=mean(hub @ p.inputs.velocity),
         flap=np.asarray(harmonic(found.z.flap)),
+        moment=np.asarray(hub_moment(found.z.flap, loads, p)),
     )
 
 
@@ -179,7 +185,7 @@ def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimme
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
     inflow = 0.02 + 0.5 * float(hover_inflow(p.thrust, p.inputs) + p.inputs.climb)
     guess = first_guess(p, controls, coning, p.model.settings.azimuths, inflow)
-    thick = _with_cores(p, THICKER)
+    thick = _with_cores(replace(p, aim="flapping"), THICKER)
     first = stages.done(
         "prescribed wake",
         anderson(residual, guess, thick, mixing=0.3, window=15, tol=5e-4, max_iterations=150, difference=True),

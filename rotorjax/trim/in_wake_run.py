@@ -32,10 +32,6 @@ class WakeResult:
 def check_in_wake(request: trim_run.Request) -> None:
     """Raise InputError where something of a request is not allowed."""
     trim_run.prepare(replace(request, inflow="vpbfsm"))
-    if request.aim != "flapping":
-        raise InputError(
-            f"Argument `for` must be 'flapping' with inflow '{NAME}', but is '{request.aim}': use pitt-peters or vpbfsm"
-        )
 
 
 def run_in_wake(
@@ -58,7 +54,7 @@ def run_in_wake(
     rotor, operating = catalogue.load(request.rotor)
     ground = None if request.height is None else plane(request.height, request.slope_deg)
     inputs = inputs_at(controls, guess.flight)
-    p = wake_trim(rotor, operating, inputs, request.thrust, ground, settings)
+    p = wake_trim(rotor, operating, inputs, request.thrust, ground, settings, request.aim)
     start = jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s])
     found = trim_in_wake(p, start, coning, progress)
     return WakeResult(request, found, float(controls.tilt), time.perf_counter() - begun)
@@ -92,6 +88,8 @@ def wake_numbers(result: WakeResult) -> dict[str, Any]:
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
         "CP_damper": 0.0,
+        "hub_roll_moment": -float(flown.moment[0]),
+        "hub_pitch_moment": float(flown.moment[1]),
         "figure_of_merit": float(flown.CT**1.5 / np.sqrt(2) / flown.CQ) if request.advance == 0 else None,
         "wall_time_s": result.wall_time_s,
     }

@@ -8,12 +8,14 @@ import pytest
 
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
+from rotorjax.rotor import flap_lag
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.hub import rotor_inputs
+from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
 from rotorjax.trim.dispatch import check_request
-from rotorjax.trim.free_wake import residual
+from rotorjax.trim.free_wake import hub_moment, residual
 from rotorjax.trim.in_wake import means, trim_in_wake, wake_trim
 from rotorjax.trim.in_wake_run import WakeResult, run_in_wake, wake_numbers
 from rotorjax.trim.run import Request
@@ -93,9 +95,21 @@ def test_hover_needs_no_cyclic_and_is_a_steady_state_of_the_coupled_rotor():
     assert float(out.CQ) == pytest.approx(flown.CQ, rel=1e-6)
 
 
+def test_hub_moment_of_flapping_blades_without_air():
+    """Free blades pull at their offset hinges: B/2 e S ν² β₁ for small flapping, nose up where the disk is low aft."""
+    p = wake_trim(*load("uh60"), rotor_inputs(), THRUST)
+    p = eqx.tree_at(lambda p: p.blade.gravity, p, jnp.zeros(()))
+    psi, size = 2 * np.pi / 8 * np.arange(8), 1e-4
+    none = AirLoads(*(jnp.zeros((8, *s)) for s in ((14, 3), (3,), (3,), (), ())), loads=None)
+    blade = p.blade
+    stiff = float(flap_lag.flap_frequency(blade)) ** 2 * float(blade.offset * blade.first_moment / blade.air)
+    found = hub_moment(jnp.asarray(size * np.cos(psi)), none, p)
+    np.testing.assert_allclose(found, [0, -4 / np.pi / 2 * stiff * size, 0], rtol=1e-6, atol=1e-12)
+    found = hub_moment(jnp.asarray(size * np.sin(psi)), none, p)
+    np.testing.assert_allclose(found, [4 / np.pi / 2 * stiff * size, 0, 0], rtol=1e-6, atol=1e-12)
+
+
 def test_what_the_free_wake_cannot_do_is_refused():
-    with pytest.raises(InputError, match="`for` must be 'flapping'"):
-        check_request(Request("uh60", THRUST, "freewake", aim="moments"))
     with pytest.raises(InputError, match="did you mean 'freewake'"):
         check_request(Request("uh60", THRUST, "freewak"))
     climbing = rotor_inputs(w=-0.02, height=1.0)
