@@ -26,16 +26,11 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST
 
 
 def pytest_collection_modifyitems(items):
-    """Notebooks first, then other files with slow tests: one that starts last is waited for alone.
-
-    The README's study comes after them: a notebook has compiled the same programs by then.
-    """
+    """README and notebooks first, then other files with slow tests: one that starts last is waited for alone."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    first = ("test_notebooks.py", "", "test_readme.py")
 
     def order(item):
-        name = item.path.name
-        return first.index(name) if name in first else 1 if item.path in slow else len(first)
+        return 0 if item.path.name == "test_documents.py" else 1 if item.path in slow else 2
 
     items.sort(key=order)
 

@@ -1,4 +1,4 @@
-"""Every code block of the README does what it says, in a fresh copy of the repository."""
+"""Every code block of the README does what it says, in a fresh copy of the repository; every notebook runs."""
 
 import os
 import re
@@ -7,12 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```(sh|python)\n(.*?)```", README, re.DOTALL)
 STUDY, TESTS, INFLOW, PYTHON = (text for _, text in BLOCKS)
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
 
 @pytest.fixture(scope="module")
@@ -49,15 +52,35 @@ def test_ci_runs_the_readmes_test_command():
     assert [line for line in README.splitlines() if re.search(pattern[1], line)] == [TESTS.strip()]
 
 
+@pytest.fixture(scope="module")
+def studied(clone):
+    """What the main command prints, and its folder `out`."""
+    return sh(STUDY, clone), clone / "out"
+
+
 @pytest.mark.slow
-def test_the_main_command_works_from_a_fresh_clone(clone):
-    run = sh(STUDY, clone)
+def test_the_main_command_works_from_a_fresh_clone(clone, studied):
+    run, out = studied
     assert run.returncode == 0, run.stderr[-2000:]
     for name in ("report.md", "summary.json", "cases.nc", "fig06.png", "overview.png"):
-        assert (clone / "out" / name).exists()
+        assert (out / name).exists()
     inflow = sh(INFLOW, clone)
     assert inflow.returncode == 0, inflow.stderr[-2000:]
-    assert (clone / "out" / "inflow.png").exists()
+    assert (out / "inflow.png").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the client's event loop, not of ours
+def test_notebook_runs(path, studied, tmp_path):
+    """From top to bottom; where a notebook takes up the study, it finds the cases that the main command left."""
+    shutil.copytree(studied[1] / "cases", tmp_path / "out" / "cases")
+    notebook = nbformat.read(path, as_version=4)
+    client = NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+    client.execute()
+    pictures = [o for cell in notebook.cells for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
+    assert pictures
+    assert not any(cell.get("outputs") for cell in nbformat.read(path, as_version=4).cells)  # kept small
 
 
 def test_python_example(clone):

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from wakes import COARSE
 
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
@@ -78,7 +79,7 @@ def test_residual_has_the_derivative_of_finite_differences(cruise):
 
 @pytest.mark.slow
 def test_hover_needs_no_cyclic_and_is_a_steady_state_of_the_coupled_rotor():
-    settings = wake_settings(panels=8, age_step_deg=20.0, near_wake_deg=100.0, free_turns=3.0, closure_turns=3)
+    settings = wake_settings(**COARSE, azimuths=4)
     p = wake_trim(*load("uh60"), rotor_inputs(), THRUST, settings=settings)
     found = trim_in_wake(p, jnp.array([0.31, 0.0, 0.0]), 0.05)
     flown = means(found)
