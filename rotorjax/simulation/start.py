@@ -1,7 +1,7 @@
 """Where a flight starts: the trim that its case asks for, with any inflow."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -73,8 +73,9 @@ def from_wake(result: WakeResult) -> Start:
     """Start from a trim in the free wake."""
     trimmed = result.trimmed
     model, p = trimmed.model, trimmed.p
-    controls = lambda u: (u.theta_0, u.theta_1c, u.theta_1s)  # noqa: E731
-    inputs = eqx.tree_at(controls, p.inputs, tuple(trimmed.z.controls))
+    height = None if model.ground is None else model.ground.height
+    theta_0, theta_1c, theta_1s = trimmed.z.controls
+    inputs = replace(p.inputs, theta_0=theta_0, theta_1c=theta_1c, theta_1s=theta_1s, height=height)
     coupled = CoupledWake(model.rotor, model.operating, p.blade, model.ground, model.settings)
     return Start(coupled, state_at(trimmed, 0), inputs, result.tilt)
 

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from vtk_file import read_polydata
 
-from rotorjax.coupled import rhs
+from rotorjax.coupled import blades_at, rhs
+from rotorjax.coupled_wake import model_of
 from rotorjax.errors import InputError
+from rotorjax.ground import plane
 from rotorjax.io import netcdf
 from rotorjax.ode.trajectory import integrate
 from rotorjax.rotor import catalogue
@@ -20,7 +22,7 @@ from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.simulation.case import read_case
 from rotorjax.simulation.files import write_all
 from rotorjax.simulation.output import over_a_turn
-from rotorjax.simulation.run import fly, fly_from
+from rotorjax.simulation.run import driver_of, fly, fly_from
 from rotorjax.simulation.start import from_wake, settings_of
 from rotorjax.simulation.step import steps_per_turn
 from rotorjax.simulation.wake_output import KINDS
@@ -47,13 +49,17 @@ def case(tmp_path_factory):
     return read_case(write(tmp_path_factory.mktemp("case"), FLIGHT, TIME, WAKE))
 
 
-@pytest.fixture(scope="module")
-def start(case):
+def started(case, ground=None, **motion):
     """Not trimmed: a prescribed wake in a wind, enough to march from."""
     settings = settings_of(case)
-    p = wake_trim(*catalogue.load("uh60"), rotor_inputs(u=0.15, w=-0.008), 0.0058, settings=settings)
+    p = wake_trim(*catalogue.load("uh60"), rotor_inputs(**motion), 0.0058, ground, settings)
     z = first_guess(p, jnp.array([0.27, 0.04, -0.04]), 0.06, settings.azimuths, 0.03)
-    return from_wake(WakeResult(case.request, TrimmedInWake(z, p, None, 0), 0.05, 0.0))
+    return from_wake(WakeResult(case.request, TrimmedInWake(z, p, None, 0), 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def start(case):
+    return started(case, u=0.15, w=-0.008)
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +151,17 @@ def test_the_wake_in_vtk_is_that_of_the_data(folder, start):
 def test_bad_wake_cases(tmp_path, text, words):
     with pytest.raises(InputError, match=words):
         read_case(write(tmp_path, text))
+
+
+def test_the_ground_comes_nearer_as_the_hub_sinks(tmp_path):
+    wake = WAKE.replace("closure_turns", "free_turns = 2.0\nclosure_turns")
+    case = read_case(write(tmp_path, OVER_GROUND, TIME, HISTORY, "w = [9.0, 9.0]\n", wake))
+    at = started(case, plane(1.0))
+    u = driver_of(case, at)(jnp.asarray(0.2 * 27.0))
+    assert float(u.height) == pytest.approx(1 - 0.2 * 9.0 / 8.177784)
+    model = model_of(u, blades_at(at.x, u, at.p), at.p)
+    assert float(model.ground.height) == float(u.height)
+    np.testing.assert_allclose(model.flight.wind, [0, 0, 9.0 / (27.0 * 8.177784)], atol=1e-15)
 
 
 def test_what_is_wrong_is_said_before_the_trim(tmp_path):
