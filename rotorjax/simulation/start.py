@@ -21,7 +21,6 @@ from rotorjax.trim.problem import inputs_at
 from rotorjax.trim.run import Result
 from rotorjax.trim.run import run as run_trim
 from rotorjax.wake.equilibrium import full_state
-from rotorjax.wake.model import WakeState
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 
 
@@ -93,9 +92,8 @@ def state_at(trimmed: TrimmedInWake, slice_: int) -> CoupledState:
     psi = jnp.asarray(2 * jnp.pi * slice_ / count, float)
     still, one = jnp.zeros(blades), jnp.ones(())
     flap, rate = multiblade.from_blades(of_blades(z.flap), of_blades(flight.flap_rate), psi, one)
-    wake = jax.tree.map(of_blades, _state(trimmed))
+    wake = jax.tree.map(of_blades, _full_state(model, z.wake)[0])
     return CoupledState(psi, RotorState(flap, rate, still, still), wake)
 
 
-def _state(trimmed: TrimmedInWake) -> WakeState:
-    return eqx.filter_jit(full_state)(trimmed.model, trimmed.z.wake)[0]
+_full_state = eqx.filter_jit(full_state)
