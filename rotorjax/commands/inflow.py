@@ -47,7 +47,9 @@ def run(chosen: argparse.Namespace) -> int:
     case = case_of(chosen)
     calibration = None if chosen.calibration is None else load(chosen.calibration)
     changes = {} if calibration is None else calibration.wake_settings
-    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, **changes)
+    settings = study_settings(
+        chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, flapping=False, **changes
+    )
     check_case(case, settings)
     check_picture(chosen.plot)
     for path in (chosen.plot, chosen.json, chosen.netcdf):

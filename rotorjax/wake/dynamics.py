@@ -60,8 +60,9 @@ def blade_loads(
         normal = control[..., 2] * jnp.cos(flap) - control[..., 0] * jnp.sin(flap)
         perpendicular = arm * model.flight.flap_rate[:, None] - normal
         pitch = pitch + model.flight.cyclic[:, None]
-    # where the flow over the blade is reversed the wake lies ahead of it, and the sign turns with it
-    downwash = downwash * jnp.tanh(tangential / REVERSAL)
+        # where the flow over the blade is reversed the wake lies ahead of it, and the sign turns with it; in hover only
+        # a wake far from the solution could do so, and then the way to it is lost
+        downwash = downwash * jnp.tanh(tangential / REVERSAL)
     return section_loads(
         model.rotor,
         model.operating,
