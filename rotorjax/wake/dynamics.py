@@ -62,7 +62,7 @@ def blade_loads(
         pitch = pitch + model.flight.cyclic[:, None]
         # where the flow over the blade is reversed the wake lies ahead of it, and the sign turns with it; in hover only
         # a wake far from the solution could do so, and then the way to it is lost
-        downwash = downwash * jnp.tanh(tangential / REVERSAL)
+        downwash = downwash * jax.scipy.special.erf(tangential / REVERSAL)
     return section_loads(
         model.rotor,
         model.operating,
