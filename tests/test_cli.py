@@ -47,7 +47,7 @@ def test_study_writes_everything_and_says_where(tmp_path, solver, capsys):
 
 def test_a_diverged_case_gives_exit_code_1(tmp_path, solver, capsys):
     solver(fails_at((2.0, 0.0)))
-    assert main(["study", "--out", str(tmp_path), "--heights", "2", "1", "--slopes"]) == 1
+    assert main(["study", "--out", str(tmp_path), "--heights", "2", "1", "--slopes", "--rigid"]) == 1
     assert "not converged: h = 2" in capsys.readouterr().out
     assert (tmp_path / "fig06.pdf").exists()
     text = (tmp_path / "report.md").read_text()
@@ -70,7 +70,7 @@ def test_an_interrupt_leaves_whole_files_and_code_130(tmp_path, solver, capsys):
 
 
 def test_inflow_of_both_models_has_the_keys_of_a_study_case(tmp_path, solver, capsys):
-    main(["study", "--out", str(tmp_path), "--heights", "1", "--slopes"])
+    main(["study", "--out", str(tmp_path), "--heights", "1", "--slopes", "--rigid"])
     entry = json.loads((tmp_path / "summary.json").read_text())["cases"][1]
     files = {name: str(tmp_path / "one" / f"a.{name}") for name in ("json", "png", "nc")}
     arguments = ["--height", "1", "--json", files["json"], "--plot", files["png"], "--netcdf", files["nc"]]

@@ -110,7 +110,6 @@ def _mesh(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _disk_axes(axes: Any, title: str) -> None:
     axes.set(aspect="equal", xticks=[], yticks=[], title=title)
-    axes.invert_yaxis()
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
