@@ -40,6 +40,6 @@ def with_flapping(case: Case, rigid: Solution, settings: StudySettings, progress
 def flap_harmonics_deg(data: xr.Dataset) -> tuple[float, float, float]:
     """β₀, β₁c, β₁s of a case in degrees."""
     flap, psi = np.rad2deg(data["flap"].to_numpy()), data["azimuth"].to_numpy()
-    if flap.size == 1:
-        return float(flap[0]), 0.0, 0.0
-    return float(np.mean(flap)), float(2 * np.mean(flap * np.cos(psi))), float(2 * np.mean(flap * np.sin(psi)))
+    mean = float(flap.mean())
+    left = flap - mean  # none where the case is axisymmetric
+    return mean, float(2 * np.mean(left * np.cos(psi))), float(2 * np.mean(left * np.sin(psi)))
