@@ -59,7 +59,12 @@ def program_cache() -> Path:
 
 
 def _set_up_jax() -> None:
-    """Double precision, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR or the caller says where."""
+    """Double precision, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR or the caller says where.
+
+    For each program that it takes from there XLA prints that this processor lacks "prefer-no-gather", which is no
+    feature of processors but a hint of its own; its real errors come as exceptions.
+    """
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # read when jax is imported
     import jax
 
     jax.config.update("jax_enable_x64", True)
