@@ -15,9 +15,10 @@ from rotorjax.ground import Plane, plane
 from rotorjax.potential.blades import linear_blades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
+from rotorjax.potential.march import simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, inflow, mean_inflow, steady_state
 from rotorjax.potential.moving_ground import still
-from rotorjax.potential.over_ground import OverGround, controls, over_ground, simulate, trim
+from rotorjax.potential.over_ground import OverGround, controls, over_ground, trim
 from rotorjax.potential.wake_transport import wake_transport
 
 R, PSI = np.linspace(0.02, 0.99, 64), np.arange(72) * 2 * np.pi / 72

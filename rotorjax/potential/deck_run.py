@@ -17,9 +17,10 @@ from rotorjax.potential.dynamics import hover_inputs
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import disk_modes, ground_table
+from rotorjax.potential.march import History, simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model
 from rotorjax.potential.moving_ground import GroundMotion, Variant, ground_states, residual
-from rotorjax.potential.over_ground import Controls, History, OverGround, controls, output, over_ground, simulate, trim
+from rotorjax.potential.over_ground import Controls, OverGround, controls, output, over_ground, trim
 from rotorjax.potential.region import half_plane
 from rotorjax.potential.wake_transport import WakeTransport, wake_transport
 

@@ -1,7 +1,7 @@
-"""A rotor over moving ground: rotor states, the wake between disk and ground, and blade loads, marched together.
+"""A rotor over moving ground: rotor states, the wake between disk and ground, and blade loads, as one system.
 
     model = over_ground(rotor_model, ground_table(rotor_model, (0.6, 3.0)), blades=linear_blades(0.08))
-    history = simulate(model, trim(model, first_controls), psi, controls)
+    state = trim(model, controls)  # `march.simulate` goes on from it
 
 The ground enters through its table (`rotorjax.potential.ground_table`); what it does to the disk is a matrix–vector
 product a step. In axial flow, with the wake straight below the disk; a wind μ reaches the loads, the mass flow and a
@@ -11,7 +11,6 @@ sloping ground, but does not skew the wake here.
 from typing import NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
@@ -19,28 +18,13 @@ from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.potential.blades import Blades, Stations, stations
+from rotorjax.potential.disk_matrices import DiskMatrices, disk_matrices
 from rotorjax.potential.dynamics import RotorInputs, mass_flow, mean_induced_inflow, rate_table
-from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_table import GroundTable, disk_modes
 from rotorjax.potential.loading import thrust_coefficient
 from rotorjax.potential.model import FiniteStateModel
-from rotorjax.potential.modes import ModeTable
-from rotorjax.potential.moving_ground import GroundMotion, Variant, plane_velocity, require_increasing, require_variant
+from rotorjax.potential.moving_ground import GroundMotion, Variant, plane_velocity, require_variant
 from rotorjax.potential.wake_transport import WakeTransport
-
-
-class DiskMatrices(eqx.Module):
-    """What is linear on the disk, tabulated once.
-
-    rotor_inflow (M, KR), ground_inflow (L, KR): inflow and upflow of unit states at the stations of the loads. pressure
-    (M, KR): from dC_T/dr̄ there to τ. rotor_harmonics (3, M), ground_harmonics (3, L): λ₀, λ₁c, λ₁s of unit states.
-    """
-
-    rotor_inflow: Float[Array, "M KR"]
-    ground_inflow: Float[Array, "L KR"]
-    pressure: Float[Array, "M KR"]
-    rotor_harmonics: Float[Array, "3 M"]
-    ground_harmonics: Float[Array, "3 L"]
 
 
 class OverGround(eqx.Module):
@@ -92,14 +76,6 @@ class Output(NamedTuple):
     ground: Float[Array, "*T L"]
 
 
-class History(NamedTuple):
-    """States and outputs at the instants psi (T,)."""
-
-    psi: Float[Array, " T"]
-    states: RotorState
-    outputs: Output
-
-
 def over_ground(
     rotor: FiniteStateModel,
     table: GroundTable,
@@ -122,14 +98,7 @@ def over_ground(
             f"variant {variant!r}, but has {table.size}: tabulate with the same model and transport"
         )
     at = stations(0.1, azimuths=max(8, 2 * int(rotor.modes.m.max()) + 2)) if at is None else at
-    return OverGround(rotor, table, transport, variant, blades, at, _disk_matrices(rotor, at))
-
-
-@eqx.filter_jit
-def _disk_matrices(rotor: FiniteStateModel, at: Stations) -> DiskMatrices:
-    both = (rotor.modes, disk_modes(rotor))
-    inflow, harmonics = [at.functions(modes) for modes in both], [_harmonics(modes, rotor) for modes in both]
-    return DiskMatrices(inflow[0], inflow[1], at.pressure(rotor.modes), harmonics[0], harmonics[1])
+    return OverGround(rotor, table, transport, variant, blades, at, disk_matrices(rotor, at))
 
 
 def controls(
@@ -194,55 +163,6 @@ def output(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGro
     tau = _loads(state, ground, now, model)
     mean = model.disk.rotor_harmonics @ state.a - model.disk.ground_harmonics @ ground
     return Output(mean[0], mean[1], mean[2], thrust_coefficient(tau, model.rotor.modes), tau, ground)
-
-
-def _harmonics(modes: ModeTable, model: FiniteStateModel) -> Float[Array, "3 M"]:
-    """λ₀, λ₁c, λ₁s of unit states: area-weighted least squares over the disk."""
-    x, y, nu, weights = (jnp.asarray(v) for v in model.quadrature.rule())
-    area = 2 * nu * weights
-    return jnp.stack([area, 4 * area * x, 4 * area * y]) @ disk_functions(modes, x, y).T
-
-
-@eqx.filter_jit
-def simulate(
-    model: OverGround, start: RotorState, psi: Float[Array, " T"], inputs: Controls, save_every: int = 1
-) -> History:
-    """March from psi[0] with inputs linear between the instants, one midpoint step (second order) an interval.
-
-    start: state at psi[0]. inputs: leading axis T. save_every: keep every that many instants. Raises InputError where
-    the instants do not increase, the shapes differ, or save_every does not divide T − 1.
-    """
-    if inputs.climb.shape != psi.shape or psi.ndim != 1 or psi.size < 2:
-        raise InputError(
-            f"Arguments `psi` and `inputs` must share their instants, at least 2, but have shapes {psi.shape} and "
-            f"{inputs.climb.shape}"
-        )
-    if save_every < 1 or (psi.size - 1) % save_every:
-        raise InputError(f"Argument `save_every` must divide the {psi.size - 1} intervals, but is {save_every}")
-    require_increasing("psi", psi)
-
-    def step(state: RotorState, row: tuple[Array, Controls, Controls]) -> tuple[RotorState, None]:
-        h, first, last = row
-        middle = jax.tree.map(lambda p, q: (p + q) / 2, first, last)
-        half = _moved(state, rhs(h, state, first, model), h / 2, model)
-        return _moved(state, rhs(h, half, middle, model), h, model), None
-
-    def stretch(state: RotorState, rows: tuple) -> tuple[RotorState, RotorState]:
-        state = jax.lax.scan(step, state, rows)[0]
-        return state, state
-
-    first, last = (jax.tree.map(lambda v, s=s: v[s], inputs) for s in (slice(None, -1), slice(1, None)))
-    rows = jax.tree.map(lambda v: v.reshape(-1, save_every, *v.shape[1:]), (jnp.diff(psi), first, last))
-    states = jax.lax.scan(stretch, start, rows)[1]
-    states = jax.tree.map(lambda one, rest: jnp.concatenate([one[None], rest]), start, states)
-    kept, instants = jax.tree.map(lambda v: v[::save_every], (inputs, psi))
-    outputs = jax.lax.map(lambda pair: output(psi[0], pair[0], pair[1], model), (states, kept))
-    return History(instants, states, outputs)
-
-
-def _moved(state: RotorState, rate: RotorState, h: Array, model: OverGround) -> RotorState:
-    a = state.a + h * rate.a
-    return RotorState(a, state.wake if model.transport is None else state.wake + h * rate.wake)
 
 
 @eqx.filter_jit
