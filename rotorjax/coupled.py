@@ -172,9 +172,9 @@ def inflow_velocity(x: CoupledState, points: Float[Array, "N 3"], u: RotorInputs
 
 
 def blades_at(x: CoupledState, u: RotorInputs, p: Coupled) -> BladesAt:
-    """Azimuth, flap and pitch of the blades."""
+    """Azimuth, flap, lag and pitch of the blades."""
     psi, q, q_dot = _angles(x, u, p)
-    return BladesAt(psi, q[:, 0], q_dot[:, 0], _pitch(psi, q, u, p))
+    return BladesAt(psi, q[:, 0], q_dot[:, 0], q[:, 1], q_dot[:, 1], _pitch(psi, q, u, p))
 
 
 def _angles(x: CoupledState, u: RotorInputs, p: Coupled):
@@ -196,12 +196,10 @@ def _evaluate(x: CoupledState, u: RotorInputs, p: Coupled) -> _Evaluation:
     frames = jax.vmap(lambda psi: turning_frame(u, psi, p.blade.gravity))(psi)
     theta = _pitch(psi, q, u, p)
     if isinstance(p, CoupledWake):
-        air, inflow = in_wake(x.inflow, u, BladesAt(psi, q[:, 0], q_dot[:, 0], theta), p)
+        air, inflow = in_wake(x.inflow, u, blades_at(x, u, p), p)
     else:
         air, inflow = _in_inflow(x.inflow, u, p, psi, frames, q, q_dot, theta)
     q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)
-    if isinstance(p, CoupledWake):
-        q_dot_dot = q_dot_dot.at[:, 1].set(0.0)  # held
     return _Evaluation(psi, frames, q, q_dot, q_dot_dot, air, inflow)
 
 

@@ -1,8 +1,7 @@
 """Blades in their own free wake: the wake's part of the coupled rotor (coupled.py), and their loads in it.
 
 The wake knows where the blades are by `wake.model.Flight`, made from the rotor's state and inputs at each instant; the
-loads are those of the wake's lifting line, at its own stations. That line does not lag, so neither do the blades: the
-lag hinge is held, and hands its moment to the hub.
+loads are those of the wake's lifting line, at its own stations, which flaps and lags with the blade.
 """
 
 from typing import NamedTuple
@@ -57,13 +56,15 @@ class CoupledWake(eqx.Module):
 
 
 class BladesAt(NamedTuple):
-    """The blades at one instant. psi (B,): azimuths. flap, flap_rate (B,): rad, per rad. theta (B,): pitch without
-    twist (rad).
+    """The blades at one instant. psi (B,): azimuths. flap, flap_rate, lag, lag_rate (B,): rad, per rad. theta (B,):
+    pitch without twist (rad).
     """
 
     psi: Float[Array, " B"]
     flap: Float[Array, " B"]
     flap_rate: Float[Array, " B"]
+    lag: Float[Array, " B"]
+    lag_rate: Float[Array, " B"]
     theta: Float[Array, " B"]
 
 
@@ -75,11 +76,20 @@ def coupled_wake(
 
 
 def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
-    """The free wake's model at one instant: wind, turning and height from the hub's motion, flap and pitch of the
-    blades.
+    """The free wake's model at one instant: wind, turning and height from the hub's motion, flap, lag and pitch of
+    the blades.
     """
-    turn = to_ellipsoidal(jnp.stack([u.p, u.q, u.r]))
-    flight = Flight(-u.velocity, p.blade.offset, blades.flap, blades.flap_rate, blades.theta - u.theta_0, turn, u.omega)
+    flight = Flight(
+        wind=-u.velocity,
+        hinge=p.blade.offset,
+        flap=blades.flap,
+        flap_rate=blades.flap_rate,
+        cyclic=blades.theta - u.theta_0,
+        turn=to_ellipsoidal(jnp.stack([u.p, u.q, u.r])),
+        speed=u.omega,
+        lag=blades.lag,
+        lag_rate=blades.lag_rate,
+    )
     model = eqx.tree_at(lambda m: m.flight, p._rigid, flight, is_leaf=lambda v: v is None)
     return driven(model, _inputs(u))
 
@@ -109,16 +119,13 @@ def wake_air_loads(
     """
     flight = model.flight
     assert flight is not None
-    flap = flight.flap[:, None]
-    zero = jnp.zeros_like(flap)
-    up = jnp.stack([-jnp.sin(flap), zero, jnp.cos(flap)], axis=-1)
-    ahead = jnp.array([0.0, 1.0, 0.0])
+    _, ahead, up = (v[:, None] for v in flight.axes)
     sine, cosine = jnp.sin(loads.inflow_angle)[..., None], jnp.cos(loads.inflow_angle)[..., None]
     lift, drag = loads.dlift[..., None], loads.ddrag[..., None]
     force = (lift * cosine - drag * sine) * up - (lift * sine + drag * cosine) * ahead
     arm = model.stations - flight.hinge
     passing = jax.vmap(lambda k, angle: undisturbed(model, model.of_slice(k).control, angle))
-    own = control - passing(jnp.arange(flap.shape[0]), psi)
+    own = control - passing(jnp.arange(flight.flap.shape[0]), psi)
     speed = loads.mach / model.operating.tip_mach(model.rotor.radius)
     return AirLoads(
         force,

@@ -85,15 +85,19 @@ def state_at(trimmed: TrimmedInWake, slice_: int) -> CoupledState:
     blades, count = model.rotor.blades, z.flap.shape[0]
     flight = model.flight
     assert flight is not None
+    assert flight.lag is not None
+    assert flight.lag_rate is not None
 
     def of_blades(v):
         return jnp.repeat(v, blades, axis=0) if count == 1 else v[slice_ :: count // blades]
 
     psi = jnp.asarray(2 * jnp.pi * slice_ / count, float)
-    still, one = jnp.zeros(blades), jnp.ones(())
-    flap, rate = multiblade.from_blades(of_blades(z.flap), of_blades(flight.flap_rate), psi, one)
-    wake = jax.tree.map(of_blades, _full_state(model, z.wake)[0])
-    return CoupledState(psi, RotorState(flap, rate, still, still), wake)
+
+    def motion(angle, rate):
+        return multiblade.from_blades(of_blades(angle), of_blades(rate), psi, jnp.ones(()))
+
+    rotor = RotorState(*motion(flight.flap, flight.flap_rate), *motion(flight.lag, flight.lag_rate))
+    return CoupledState(psi, rotor, jax.tree.map(of_blades, _full_state(model, z.wake)[0]))
 
 
 _full_state = eqx.filter_jit(full_state)

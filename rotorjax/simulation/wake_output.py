@@ -49,15 +49,16 @@ def seen(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Seen:
     r = model.edges
     chord = geometry.chord(p.rotor, r)[:, None]
 
-    def one(k, psi, theta, flap, slice_):
+    def one(k, psi, theta, slice_):
         own = model.of_slice(k)
+        assert own.flight is not None
         start = releases(own, slice_)
         filaments = jnp.concatenate([start.points[:, None], slice_.far], axis=1)
         circulation = jnp.concatenate([start.strength[:, None], slice_.gamma_far], axis=1)
         core = cores(own, start.strength[0])[:, : slice_.far.shape[1]]
         pitch = (theta + geometry.twist(p.rotor, r))[:, None]
-        up = jnp.stack([-jnp.sin(flap), jnp.zeros_like(flap), jnp.cos(flap)])
-        ahead = jnp.cos(pitch) * jnp.array([0.0, 1.0, 0.0]) + jnp.sin(pitch) * up
+        _, forward, up = own.flight.axes
+        ahead = jnp.cos(pitch) * forward + jnp.sin(pitch) * up
         lattice = lattice_nodes(own, slice_.near)
         leading, trailing = own.leading + 0.25 * chord * ahead, own.leading - 0.75 * chord * ahead
         filaments, lattice, leading, trailing = (
@@ -65,7 +66,7 @@ def seen(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Seen:
         )
         return Seen(filaments, circulation, core, lattice, leading, trailing, slice_.gamma_bound)
 
-    rows = (jnp.arange(p.rotor.blades), blades.psi, blades.theta, blades.flap, x.inflow)
+    rows = (jnp.arange(p.rotor.blades), blades.psi, blades.theta, x.inflow)
     return jax.vmap(one)(*rows)
 
 

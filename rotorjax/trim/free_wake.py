@@ -1,9 +1,9 @@
-"""Trim of a rotor in its free wake: wake, flapping and controls as one periodic problem.
+"""Trim of a rotor in its free wake: wake, flap, lag and controls as one periodic problem.
 
-Unknowns are the periodic wake (K slices, wake/equilibrium.py), the flap angle of the blade at each slice and the three
-controls. Their residual joins that of the wake with the defect of the flap equation, taken through a well-damped linear
-flap equation so that it is an angle again, and with the trim equations. Blades do not lag. K = 1 is the axisymmetric
-hover, where cyclic pitch has nothing to do.
+Unknowns are the periodic wake (K slices, wake/equilibrium.py), the flap and lag angles of the blade at each slice and
+the three controls. Their residual joins that of the wake with the defects of the flap and lag equations, taken through
+damped linear ones so that they are angles again, and with the trim equations. K = 1 is the axisymmetric hover, where
+cyclic pitch has nothing to do.
 """
 
 from typing import NamedTuple
@@ -26,18 +26,19 @@ from rotorjax.wake.model import Flight, FreeWake, azimuths
 from rotorjax.wake.start import prescribed
 from rotorjax.wake.transport import harmonics
 
-DAMPING = 1.0
-"""Of the linear flap equation (per rad), about γ/8."""
+DAMPING = np.array([1.0, 0.1])
+"""Of the linear flap and lag equations (per rad): about γ/8, and a lag damper's."""
 
 THRUST_STEP = 0.1
 """Collective (rad) that a thrust equation is worth, wanted thrust against none: makes the residual an angle."""
 
 
 class InWake(NamedTuple):
-    """Unknowns. wake: K slices. flap (K,) rad. controls (3,): θ₀, θ₁c, θ₁s (rad)."""
+    """Unknowns. wake: K slices. flap, lag (K,) rad. controls (3,): θ₀, θ₁c, θ₁s (rad)."""
 
     wake: Unknowns
     flap: Float[Array, " K"]
+    lag: Float[Array, " K"]
     controls: Float[Array, "3"]
 
 
@@ -56,22 +57,30 @@ class WakeTrim(eqx.Module):
 
 def flown(z: InWake, p: WakeTrim) -> FreeWake:
     """The free wake's model with the motion and controls of z."""
-    slices = z.flap.shape[0]
-    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    psi = _azimuths(z.flap)
     theta_0, theta_1c, theta_1s = z.controls
     cyclic = theta_1c * jnp.cos(psi) + theta_1s * jnp.sin(psi) - p.blade.coupling * (z.flap - p.blade.precone)
-    flight = Flight(-p.inputs.velocity, p.blade.offset, z.flap, _rate(z.flap), cyclic)
+    flight = Flight(
+        wind=-p.inputs.velocity,
+        hinge=p.blade.offset,
+        flap=z.flap,
+        flap_rate=_rate(z.flap),
+        cyclic=cyclic,
+        lag=z.lag,
+        lag_rate=_rate(z.lag),
+    )
     model = eqx.tree_at(lambda m: m.operating.collective, p.model, theta_0)
     return eqx.tree_at(lambda m: m.flight, model, flight, is_leaf=lambda v: v is None)
 
 
 def residual(z: InWake, p: WakeTrim) -> InWake:
-    """How far one pass moves wake, flap and controls; zero in trim."""
+    """How far one pass moves wake, blades and controls; zero in trim."""
     model = flown(z, p)
     found = evaluate(model, z.wake)
     wake = jax.tree.map(lambda new, old: new - old, transported(model, found), z.wake)
     loads = loads_of(model, found)
-    return InWake(wake, flap_defect(z.flap, loads, p), _trim_defect(z, loads, p))
+    flap, lag = blade_defect(z.flap, z.lag, loads, p).T
+    return InWake(wake, flap, lag, _trim_defect(z, loads, p))
 
 
 def loads_of(model: FreeWake, found: Evaluation) -> AirLoads:
@@ -84,13 +93,12 @@ def thrust_of(loads: AirLoads, p: WakeTrim) -> Float[Array, ""]:
     return p.model.rotor.blades / jnp.pi * jnp.mean(loads.force[:, 2])
 
 
-def harmonic(flap: Float[Array, " K"]) -> Float[Array, "3"]:
-    """β₀, β₁c, β₁s; one slice alone stands for an axisymmetric motion."""
-    if flap.shape[0] == 1:
-        return jnp.concatenate([flap, jnp.zeros(2)])
-    slices = flap.shape[0]
-    psi = 2 * jnp.pi / slices * jnp.arange(slices)
-    return jnp.stack([jnp.mean(flap), 2 * jnp.mean(flap * jnp.cos(psi)), 2 * jnp.mean(flap * jnp.sin(psi))])
+def harmonic(angle: Float[Array, " K"]) -> Float[Array, "3"]:
+    """β₀, β₁c, β₁s of a flap angle, or ζ₀, ζ₁c, ζ₁s of a lag; one slice alone stands for an axisymmetric motion."""
+    if angle.shape[0] == 1:
+        return jnp.concatenate([angle, jnp.zeros(2)])
+    psi = _azimuths(angle)
+    return jnp.stack([jnp.mean(angle), 2 * jnp.mean(angle * jnp.cos(psi)), 2 * jnp.mean(angle * jnp.sin(psi))])
 
 
 def _trim_defect(z: InWake, loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
@@ -101,36 +109,38 @@ def _trim_defect(z: InWake, loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
     if z.flap.shape[0] == 1:
         return jnp.stack([short, -z.controls[1], -z.controls[2]])
     if p.aim == "moments":
-        cosine, sine = hub_moment(z.flap, loads, p)[1::-1] / p.thrust
+        cosine, sine = hub_moment(z.flap, z.lag, loads, p)[1::-1] / p.thrust
     else:
         _, cosine, sine = harmonic(z.flap)
     return jnp.stack([short, -sine, cosine])
 
 
-def flap_defect(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, " K"]:
-    """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap equation."""
-    _, _, wanted = _motion(flap, loads, p)
-    number = jnp.asarray(harmonics(flap.shape[0]))
-    left = jnp.fft.fft(wanted[:, 0]) + number**2 * jnp.fft.fft(flap)
-    frequency = flap_lag.flap_frequency(p.blade)
-    return jnp.fft.ifft(left / (frequency**2 - number**2 + 1j * DAMPING * number)).real
+def blade_defect(
+    flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoads, p: WakeTrim
+) -> Float[Array, "K 2"]:
+    """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap and lag equations."""
+    _, (angles, _), wanted = _motion(flap, lag, loads, p)
+    number = jnp.asarray(harmonics(flap.shape[0]))[:, None]
+    left = jnp.fft.fft(wanted, axis=0) + number**2 * jnp.fft.fft(angles, axis=0)
+    frequency = jnp.stack([flap_lag.flap_frequency(p.blade), flap_lag.lag_frequency(p.blade)])
+    return jnp.fft.ifft(left / (frequency**2 - number**2 + 1j * DAMPING * number), axis=0).real
 
 
-def hub_moment(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
+def hub_moment(flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
     """Mean moment of air and inertia on the hub, in its frame, over ρA(ΩR)²R; one slice alone has no cyclic part."""
-    frames, (angles, rates), wanted = _motion(flap, loads, p)
-    held = wanted.at[:, 1].set(0.0)  # the lag hinge hands its moment on
-    found = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(frames, angles, rates, held, loads.force, loads.moment)
+    frames, (angles, rates), wanted = _motion(flap, lag, loads, p)
+    found = jax.vmap(lambda *a: flap_lag.hub_loads(p.blade, *a))(
+        frames, angles, rates, wanted, loads.force, loads.moment
+    )
     turned = rotate_about_shaft(found.moment, _azimuths(flap))
     mean = p.model.rotor.blades / jnp.pi * jnp.mean(turned, axis=0)
     return mean * jnp.array([0.0, 0.0, 1.0]) if flap.shape[0] == 1 else mean
 
 
-def _motion(flap: Float[Array, " K"], loads: AirLoads, p: WakeTrim):
-    """Turning frames, angles and rates, and accelerations of blades that flap and do not lag."""
+def _motion(flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoads, p: WakeTrim):
+    """Turning frames, angles and rates (flap, lag), and the accelerations that the blades' equations want."""
     frames = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity))(_azimuths(flap))
-    still = jnp.zeros_like(flap)
-    angles, rates = jnp.stack([flap, still], axis=-1), jnp.stack([_rate(flap), still], axis=-1)
+    angles, rates = jnp.stack([flap, lag], axis=-1), jnp.stack([_rate(flap), _rate(lag)], axis=-1)
     wanted = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, angles, rates, loads.moment)
     return frames, (angles, rates), wanted
 
@@ -139,13 +149,13 @@ def _azimuths(flap: Float[Array, " K"]) -> Float[Array, " K"]:
     return 2 * jnp.pi / flap.shape[0] * jnp.arange(flap.shape[0])
 
 
-def _rate(flap: Float[Array, " K"]) -> Float[Array, " K"]:
-    """∂β/∂ψ, exact for every harmonic that K slices hold."""
-    return jnp.fft.ifft(1j * jnp.asarray(harmonics(flap.shape[0])) * jnp.fft.fft(flap)).real
+def _rate(angle: Float[Array, " K"]) -> Float[Array, " K"]:
+    """∂/∂ψ, exact for every harmonic that K slices hold."""
+    return jnp.fft.ifft(1j * jnp.asarray(harmonics(angle.shape[0])) * jnp.fft.fft(angle)).real
 
 
 def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices: int, inflow: float) -> InWake:
-    """A prescribed wake carried by the wind, blades that cone alone."""
+    """A prescribed wake carried by the wind, blades that cone and do not lag."""
     wake = spread(prescribed(p.model, inflow), slices)
     step = p.model.settings.age_step
     psi = 2 * np.pi / slices * np.arange(slices)
@@ -156,4 +166,4 @@ def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices:
         return nodes + age[:, None] * wind[:, None, None, :]
 
     moved = wake._replace(near=carry(wake.near, 1), far=carry(wake.far, p.model.settings.near_ages + 1))
-    return InWake(moved, jnp.full(slices, float(coning)), controls)
+    return InWake(moved, jnp.full(slices, float(coning)), jnp.zeros(slices), controls)

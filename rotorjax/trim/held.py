@@ -1,5 +1,7 @@
 """Blades left to flap at held controls over a fixed hub: wake and flapping as one periodic problem.
 
+Their lag hinges are held: a steady lag turns each blade and its wake about the hinge, and leaves the loads as they are
+but for the blade's tip, which comes closer to the shaft by e(1 − cos ζ), under 1e-3 R.
 It starts from the wake of rigid blades, which has its own continuation (wake/solution.py).
 """
 
@@ -16,7 +18,7 @@ from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.hub import rotor_inputs
-from rotorjax.trim.free_wake import InWake, WakeTrim, flap_defect, flown, harmonic, loads_of
+from rotorjax.trim.free_wake import InWake, WakeTrim, blade_defect, flown, harmonic, loads_of
 from rotorjax.trim.in_wake import TrimmedInWake, means
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.equilibrium import Unknowns, evaluate, evaluated, transported
@@ -55,7 +57,7 @@ def residual(x: Flapping, p: WakeTrim) -> Flapping:
     model = flown(_with_controls(x, p), p)
     found = evaluate(model, x.wake)
     wake = jax.tree.map(lambda new, old: new - old, transported(model, found), x.wake)
-    return Flapping(wake, flap_defect(x.flap, loads_of(model, found), p))
+    return Flapping(wake, blade_defect(x.flap, 0 * x.flap, loads_of(model, found), p)[:, 0])
 
 
 def let_flap(rigid: Solution, progress: Progress | None = None, tol: float = 1e-7) -> Flapped:
@@ -105,7 +107,7 @@ class _Inverse(eqx.Module):
 
 def _with_controls(x: Flapping, p: WakeTrim) -> InWake:
     collective = p.model.operating.collective
-    return InWake(x.wake, x.flap, jnp.stack([collective, *jnp.zeros((2,))]))
+    return InWake(x.wake, x.flap, 0 * x.flap, jnp.stack([collective, *jnp.zeros((2,))]))
 
 
 def _through_the_blades(model: FreeWake, x: Flapping) -> Float[Array, "K R"]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -20,7 +21,7 @@ from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor.flap_lag import blade_of
+from rotorjax.rotor.flap_lag import blade_of, damper_moment, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.rotor.moving_blade import AirLoads
@@ -34,7 +35,7 @@ from rotorjax.wake.solution import solve
 Progress = Callable[[str, float], None]
 
 TOL = 1e-7
-"""Relative rms of the residual of wake, flapping and controls together."""
+"""Relative rms of the residual of wake, blades and controls together."""
 
 THICKER = 1.6
 """Cores at the start in a wind, over the settings': with them Anderson's iteration converges from a prescribed wake."""
@@ -57,8 +58,8 @@ class TrimmedInWake:
 
 @dataclass(frozen=True)
 class Means:
-    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s (rad), moment (3,) on
-    the hub over ρA(ΩR)²R, hub frame.
+    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s and lagging ζ₀, ζ₁c,
+    ζ₁s (rad), moment (3,) on the hub over ρA(ΩR)²R, hub frame.
     """
 
     CT: float
@@ -66,7 +67,9 @@ class Means:
     CP_induced: float
     CP_profile: float
     CP_parasite: float
+    CP_damper: float
     flap: np.ndarray
+    lag: np.ndarray
     moment: np.ndarray
 
 
@@ -79,12 +82,21 @@ def wake_trim(
     settings: WakeSettings | None = None,
     aim: Aim = "flapping",
 ) -> WakeTrim:
-    """Set a trim up. Raises InputError where the rotor has no hinge data, or as `free_wake` does."""
+    """Set a trim up.
+
+    Raises InputError where the rotor has no hinge data or nothing holds its blades in lag, or as `free_wake` does.
+    """
     if settings is None:
         settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     model = free_wake(rotor, still, ground, settings)
-    return WakeTrim(model, blade_of(rotor, operating), inputs, jnp.asarray(thrust, float), aim)
+    blade = blade_of(rotor, operating)
+    if not float(lag_frequency(blade)) > 0:
+        raise InputError(
+            f"Argument `rotor` must hold its blades in lag, but those of {rotor.name} have their hinge on the shaft "
+            "and no spring: give it `offset` or `lag_spring`"
+        )
+    return WakeTrim(model, blade, inputs, jnp.asarray(thrust, float), aim)
 
 
 def windy(inputs: RotorInputs) -> bool:
@@ -113,14 +125,15 @@ def trim_in_wake(
 
 def means(found: TrimmedInWake) -> Means:
     """Performance of a trim."""
-    evaluation, loads = evaluated(found.z, found.p)
-    p, blades = found.p, found.p.model.rotor.blades
+    _, loads = evaluated(found.z, found.p)
+    z, p, blades = found.z, found.p, found.p.model.rotor.blades
     model = found.model
     flight = model.flight
     assert flight is not None
-    arm = flight.hinge + (model.stations - flight.hinge) * jnp.cos(found.z.flap)[:, None]
-    slices = found.z.flap.shape[0]
-    psi = 2 * jnp.pi / slices * jnp.arange(slices)
+    assert flight.lag_rate is not None
+    place = jax.vmap(lambda k: model.of_slice(k).control)(jnp.arange(z.flap.shape[0]))
+    torque = jnp.cross(place, loads.per_length)[..., 2]
+    psi = 2 * jnp.pi / z.flap.shape[0] * jnp.arange(z.flap.shape[0])
 
     def mean(power) -> float:
         return float(blades / jnp.pi * jnp.mean(power))
@@ -129,15 +142,16 @@ def means(found: TrimmedInWake) -> Means:
     along = force[:, 0] * jnp.cos(psi) - force[:, 1] * jnp.sin(psi)
     across = force[:, 0] * jnp.sin(psi) + force[:, 1] * jnp.cos(psi)
     hub = jnp.stack([along, across, force[:, 2]], axis=-1)
-    del evaluation
     return Means(
         CT=mean(force[:, 2]),
-        CQ=mean(-(arm * loads.per_length[..., 1]) @ model.widths),
+        CQ=mean(-torque @ model.widths),
         CP_induced=mean(loads.induced),
         CP_profile=mean(loads.profile),
         CP_parasite=mean(hub @ p.inputs.velocity),
-        flap=np.asarray(harmonic(found.z.flap)),
-        moment=np.asarray(hub_moment(found.z.flap, loads, p)),
+        CP_damper=mean(damper_moment(p.blade, flight.lag_rate) * flight.lag_rate / p.blade.air),
+        flap=np.asarray(harmonic(z.flap)),
+        lag=np.asarray(harmonic(z.lag)),
+        moment=np.asarray(hub_moment(z.flap, z.lag, loads, p)),
     )
 
 
@@ -174,7 +188,7 @@ def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimme
     )
     rigid = solve(model, progress=stages._progress)
     slices = rigid.state.near.shape[0]
-    z = InWake(rigid.unknowns, jnp.full(slices, float(coning)), controls.at[1:].set(0.0))
+    z = InWake(rigid.unknowns, jnp.full(slices, float(coning)), jnp.zeros(slices), controls.at[1:].set(0.0))
     if rigid.converged:
         outcome = stages.newton("trim", z, p, TOL)
     else:

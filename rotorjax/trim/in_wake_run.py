@@ -65,8 +65,8 @@ def wake_numbers(result: WakeResult) -> dict[str, Any]:
     request, found = result.request, result.trimmed
     flown = means(found)
     angles = zip(
-        ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s"),
-        np.rad2deg([*found.z.controls, result.tilt, *flown.flap]),
+        ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s", "lag_0"),
+        np.rad2deg([*found.z.controls, result.tilt, *flown.flap, flown.lag[0]]),
         strict=True,
     )
     return {
@@ -80,14 +80,13 @@ def wake_numbers(result: WakeResult) -> dict[str, Any]:
         "height": request.height,
         "slope_deg": request.slope_deg,
         **{f"{name}_deg": float(value) for name, value in angles},
-        "lag_0_deg": 0.0,
         "CT": flown.CT,
         "CT_over_solidity": flown.CT / float(solidity(found.p.model.rotor)),
         "CP": flown.CQ,
         "CP_induced": flown.CP_induced,
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
-        "CP_damper": 0.0,
+        "CP_damper": flown.CP_damper,
         "hub_roll_moment": -float(flown.moment[0]),
         "hub_pitch_moment": float(flown.moment[1]),
         "figure_of_merit": float(flown.CT**1.5 / np.sqrt(2) / flown.CQ) if request.advance == 0 else None,

@@ -55,10 +55,7 @@ def blade_loads(
     tangential, perpendicular, pitch = model.stations - control[..., 1], -control[..., 2], inputs.collective
     downwash = gamma_bound @ chord_downwash(model.stations, model.edges, behind).T
     if model.flight is not None:
-        flap, arm = model.flight.flap[:, None], model.stations - model.flight.hinge
-        tangential = model.speed * (model.flight.hinge + arm * jnp.cos(flap)) - control[..., 1]
-        normal = control[..., 2] * jnp.cos(flap) - control[..., 0] * jnp.sin(flap)
-        perpendicular = arm * model.flight.flap_rate[:, None] - normal
+        tangential, perpendicular = across_blades(model, control)
         pitch = pitch + model.flight.cyclic[:, None]
         # where the flow over the blade is reversed the wake lies ahead of it, and the sign turns with it; in hover only
         # a wake far from the solution could do so, and then the way to it is lost
@@ -73,6 +70,21 @@ def blade_loads(
         chord_downwash=downwash,
         span_mean=span_averages(model.stations, model.widths, model.settings.stall_chords * model.chords),
     )
+
+
+def across_blades(model: FreeWake, control: Float[Array, "K R 3"]) -> tuple[Float[Array, "K R"], Float[Array, "K R"]]:
+    """Velocities u_T and u_P (blade_element.py) of the air over blades that flap and lag."""
+    flight = model.flight
+    assert flight is not None
+    outboard, ahead, up = (v[:, None] for v in flight.axes)
+    arm = (model.stations - flight.hinge)[:, None]
+    place = arm * outboard + flight.hinge * jnp.array([1.0, 0.0, 0.0])
+    carried = model.speed * jnp.stack([-place[..., 1], place[..., 0], jnp.zeros_like(place[..., 0])], axis=-1)
+    through = carried - control
+    tangential, perpendicular = jnp.sum(through * ahead, axis=-1), jnp.sum(through * up, axis=-1)
+    if flight.lag_rate is not None:
+        tangential = tangential - arm[:, 0] * (jnp.cos(flight.flap) * flight.lag_rate)[:, None]
+    return tangential, perpendicular + arm[:, 0] * flight.flap_rate[:, None]
 
 
 def leading_lines(model: FreeWake, count: int) -> Float[Array, "K R1 3"]:

@@ -10,8 +10,9 @@ frame: x outboard along the blade, y in the direction of rotation, z up. One lay
                     of the B blades at one instant.
 """
 
+from dataclasses import replace
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -44,9 +45,10 @@ class Flight(eqx.Module):
     """How hub and blades move, beyond a rigid rotor that hovers or climbs.
 
     wind (3,): velocity of the air far away, seen from the hub, over ΩR, in the hub frame (x aft, z up); the operating
-    point's climb comes on top. hinge: e/R of the flap hinge. flap, flap_rate (K,): of the blade of each slice (rad, per
-    rad). cyclic (K,): its pitch beyond collective and twist (rad). turn (3,): angular velocity of the hub over Ω, hub
-    frame; None for none. speed (): the rotor's speed over Ω, which stays the unit of velocities; None for 1.
+    point's climb comes on top. hinge: e/R of the flap and lag hinges. flap, flap_rate (K,): of the blade of each slice
+    (rad, per rad). cyclic (K,): its pitch beyond collective and twist (rad). turn (3,): angular velocity of the hub
+    over Ω, hub frame; None for none. speed (): the rotor's speed over Ω, which stays the unit of velocities; None for
+    1. lag, lag_rate (K,): back (rad, per rad); both None for blades whose lag hinge is held.
     """
 
     wind: Float[Array, "3"]
@@ -56,6 +58,21 @@ class Flight(eqx.Module):
     cyclic: Float[Array, " K"]
     turn: Float[Array, "3"] | None = None
     speed: Float[Array, ""] | None = None
+    lag: Float[Array, " K"] | None = None
+    lag_rate: Float[Array, " K"] | None = None
+
+    def of_slice(self, k: int | Int[Array, ""]) -> "Flight":
+        """The motion of one slice's blade alone."""
+        names = ("flap", "flap_rate", "cyclic", "lag", "lag_rate")
+        return replace(self, **{n: v[k] for n in names if (v := getattr(self, n)) is not None})
+
+    @property
+    def axes(self) -> tuple[Float[Array, "*K 3"], Float[Array, "*K 3"], Float[Array, "*K 3"]]:
+        """Unit vectors of each blade in its turning frame: outboard n, ahead and up, as in rotor/moving_blade.py."""
+        flap, lag = self.flap, jnp.zeros_like(self.flap) if self.lag is None else self.lag
+        (cf, sf), (cl, sl) = ((jnp.cos(v), jnp.sin(v)) for v in (flap, lag))
+        outboard, ahead, up = (cf * cl, -cf * sl, sf), (sl, cl, jnp.zeros_like(flap)), (-sf * cl, sf * sl, cf)
+        return jnp.stack(outboard, axis=-1), jnp.stack(ahead, axis=-1), jnp.stack(up, axis=-1)
 
 
 class FreeWake(eqx.Module):
@@ -74,10 +91,7 @@ class FreeWake(eqx.Module):
 
     def of_slice(self, k: int | Int[Array, ""]) -> "FreeWake":
         """The model of one slice: its blade's motion alone."""
-        if self.flight is None:
-            return self
-        own = jax.tree.map(lambda a: a[k], (self.flight.flap, self.flight.flap_rate, self.flight.cyclic))
-        return eqx.tree_at(lambda m: (m.flight.flap, m.flight.flap_rate, m.flight.cyclic), self, own)
+        return self if self.flight is None else replace(self, flight=self.flight.of_slice(k))
 
     @property
     def edges(self) -> Float[Array, " R+1"]:
@@ -98,7 +112,7 @@ class FreeWake(eqx.Module):
 
     @property
     def leading(self) -> Float[Array, "R+1 3"]:
-        """Nodes of the lifting line, a straight line along the blade axis; of a flapping blade, ask for its slice.
+        """Nodes of the lifting line, a straight line along the blade axis; of a moving blade, ask for its slice.
 
         The swept tip is kept in the geometry (`geometry.sweep_offset`) but the lifting line stays straight: a kink in
         it would see its own logarithmic singularity.
@@ -107,7 +121,7 @@ class FreeWake(eqx.Module):
 
     @property
     def control(self) -> Float[Array, "R 3"]:
-        """Control points on the blade; of a flapping blade, ask for its slice."""
+        """Control points on the blade; of a moving blade, ask for its slice."""
         return on_blade(self, self.stations)
 
     @property
@@ -158,13 +172,11 @@ def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:
 
 
 def on_blade(model: FreeWake, r: Float[Array, " N"]) -> Float[Array, "N 3"]:
-    """Points at r on the blade of a slice's model, flapped about its hinge, in the blade's frame."""
+    """Points at r on the blade of a slice's model, flapped and lagged about its hinges, in the blade's frame."""
     if model.flight is None:
         return along_blade(r)
-    hinge, flap = model.flight.hinge, model.flight.flap
-    return along_blade(jnp.full_like(r, hinge)) + (r - hinge)[:, None] * jnp.stack(
-        [jnp.cos(flap), jnp.zeros_like(flap), jnp.sin(flap)]
-    )
+    hinge = model.flight.hinge
+    return along_blade(jnp.full_like(r, hinge)) + (r - hinge)[:, None] * model.flight.axes[0]
 
 
 def slices(state: WakeState) -> int:

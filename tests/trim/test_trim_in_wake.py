@@ -17,7 +17,7 @@ from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
 from rotorjax.trim.dispatch import check_request
 from rotorjax.trim.free_wake import hub_moment, residual
-from rotorjax.trim.in_wake import means, trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import evaluated, means, trim_in_wake, wake_trim
 from rotorjax.trim.in_wake_run import WakeResult, run_in_wake, wake_numbers
 from rotorjax.trim.run import Request
 from rotorjax.wake.settings import flight_settings, wake_settings
@@ -50,8 +50,9 @@ def test_forward_flight_is_trimmed(told):
 @pytest.mark.slow
 def test_power_adds_up(told):
     """The shaft's work goes into induced flow, drag and flight; blades keep none over a revolution."""
-    parts = sum(told[f"CP_{part}"] for part in ("induced", "profile", "parasite"))
+    parts = sum(told[f"CP_{part}"] for part in ("induced", "profile", "parasite", "damper"))
     assert parts == pytest.approx(told["CP"], rel=2e-5)
+    assert 0 < told["CP_damper"] < 1e-3 * told["CP"]
 
 
 @pytest.mark.slow
@@ -88,12 +89,39 @@ def test_hover_needs_no_cyclic_and_is_a_steady_state_of_the_coupled_rotor():
     assert flown.CP_induced + flown.CP_profile == pytest.approx(flown.CQ, rel=1e-6)
     assert flown.CP_parasite == 0
     assert 0.04 < flown.flap[0] < 0.07
+    _lag_balances_the_torque(found, flown)
     start = from_wake(WakeResult(Request("uh60", THRUST, "freewake"), found, 0.0, 0.0))
     rates, out = instant(start.x, start.inputs, start.p)
     still = (rates.rotor, rates.inflow)
     assert max(float(jnp.max(jnp.abs(leaf))) for leaf in jax.tree.leaves(still)) < 1e-6
     assert float(out.CT) == pytest.approx(THRUST, rel=1e-6)
     assert float(out.CQ) == pytest.approx(flown.CQ, rel=1e-6)
+    _lag_frequency_without_air(start)
+
+
+def _lag_balances_the_torque(found, flown):
+    """The air's moment about the lag hinge against e S Ω² ζ; by torque as large as with Pitt and Peters' inflow."""
+    blade, loads = found.p.blade, evaluated(found.z, found.p)[1]
+    ahead = np.array([np.sin(flown.lag[0]), np.cos(flown.lag[0]), 0.0])
+    against = -float(blade.air * loads.moment[0] @ ahead)
+    assert np.sin(flown.lag[0]) == pytest.approx(against / float(blade.offset * blade.first_moment), rel=1e-6)
+    lag_0_deg, torque = 5.1333, 4.00552e-4  # `rotorjax trim --thrust-coefficient 0.0058 --json FILE`
+    assert np.rad2deg(flown.lag[0]) / flown.CQ == pytest.approx(lag_0_deg / torque, rel=0.01)
+
+
+def _lag_frequency_without_air(start):
+    """The coupled wake's own equations: 0.268 per rev from hinge offset and inertia."""
+    p = eqx.tree_at(lambda p: p.blade.air, start.p, jnp.asarray(1e-12))
+    still = eqx.tree_at(lambda x: x.rotor, start.x, jax.tree.map(jnp.zeros_like, start.x.rotor))
+    step = 1e-4
+
+    def pull(lag):
+        x = eqx.tree_at(lambda x: x.rotor.lag, still, still.rotor.lag.at[0].set(lag))
+        return float(instant(x, start.inputs, p)[0].rotor.lag_rate[0])
+
+    stiffness = -(pull(step) - pull(-step)) / (2 * step)
+    assert np.sqrt(stiffness) == pytest.approx(float(flap_lag.lag_frequency(p.blade)), rel=1e-6)
+    assert np.sqrt(stiffness) == pytest.approx(0.268, abs=5e-4)
 
 
 def test_hub_moment_of_flapping_blades_without_air():
@@ -104,9 +132,9 @@ def test_hub_moment_of_flapping_blades_without_air():
     none = AirLoads(*(jnp.zeros((8, *s)) for s in ((14, 3), (3,), (3,), (), ())), loads=None)
     blade = p.blade
     stiff = float(flap_lag.flap_frequency(blade)) ** 2 * float(blade.offset * blade.first_moment / blade.air)
-    found = hub_moment(jnp.asarray(size * np.cos(psi)), none, p)
+    found = hub_moment(jnp.asarray(size * np.cos(psi)), jnp.zeros(8), none, p)
     np.testing.assert_allclose(found, [0, -4 / np.pi / 2 * stiff * size, 0], rtol=1e-6, atol=1e-12)
-    found = hub_moment(jnp.asarray(size * np.sin(psi)), none, p)
+    found = hub_moment(jnp.asarray(size * np.sin(psi)), jnp.zeros(8), none, p)
     np.testing.assert_allclose(found, [4 / np.pi / 2 * stiff * size, 0, 0], rtol=1e-6, atol=1e-12)
 
 
