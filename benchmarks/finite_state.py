@@ -19,7 +19,9 @@ from rotorjax.potential.march import simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, inflow, mean_inflow, steady_state
 from rotorjax.potential.moving_ground import still
 from rotorjax.potential.over_ground import OverGround, controls, over_ground, trim
+from rotorjax.potential.tip_path import tip_path
 from rotorjax.potential.wake_transport import wake_transport
+from rotorjax.rotor.catalogue import load
 
 R, PSI = np.linspace(0.02, 0.99, 64), np.arange(72) * 2 * np.pi / 72
 
@@ -42,15 +44,18 @@ def set_ground(model: FiniteStateModel, ground: jax.Array) -> FiniteStateModel:
     return eqx.tree_at(lambda m: m.ground, model, Plane(ground[0], ground[1]))
 
 
-def moving(harmonics: int, terms: int, variant: str, slope: float = 0.0, loads: bool = True) -> OverGround:
-    """A rotor over moving ground, heights 0.5 to 3."""
+def moving(
+    harmonics: int, terms: int, variant: str, slope: float = 0.0, loads: bool = True, flapping: bool = False
+) -> OverGround:
+    """A rotor over moving ground, heights 0.5 to 3, with rigid blades or with the UH-60's flapping."""
     rotor = finite_state_model(
         None, harmonics, terms, harmonics, 5, quadrature=DiskQuadrature(12, max(8, 4 * harmonics))
     )
     transport = wake_transport(3.3, 8) if variant == "dynamic" else None
     table = ground_table(rotor, (0.5, 3.0), (-slope, slope), transport=transport, tolerance=1e-6)
     at = stations(0.1, 10, max(6, 2 * harmonics + 2))
-    return over_ground(rotor, table, linear_blades(0.08) if loads else None, variant, transport, at)
+    flap = tip_path(*load("uh60")) if flapping else None
+    return over_ground(rotor, table, linear_blades(0.08) if loads else None, variant, transport, at, flap)
 
 
 def march(model: OverGround, seconds: float, steps_per_turn: int, save_every: int) -> tuple[Callable, tuple, int]:
@@ -82,19 +87,26 @@ def dynamic_cases() -> dict[str, dict[str, float]]:
     for name, settings in {
         "quasi-steady_given_loads": (4, 6, "quasi-steady", 0.0, False),
         "quasi-steady_linear_blades": (4, 6, "quasi-steady", 0.0, True),
+        "quasi-steady_flapping": (4, 6, "quasi-steady", 0.0, True, True),
         "quasi-steady_pitching": (4, 6, "quasi-steady", 8.0, True),
+        "quasi-steady_pitching_flapping": (4, 6, "quasi-steady", 8.0, True, True),
         "dynamic_given_loads": (4, 6, "dynamic", 0.0, False),
         "dynamic_linear_blades": (4, 6, "dynamic", 0.0, True),
+        "dynamic_flapping": (4, 6, "dynamic", 0.0, True, True),
     }.items():
         run, arguments, steps = march(moving(*settings), 15.0, 32, 16)
         found = measure(run, *arguments, repeats=9)
         results[f"step_m4_6_terms_{name}"] = {**found, "step_us": 1e6 * found["median_s"] / steps}
-    run, (collective,), steps = march(moving(1, 3, "quasi-steady"), 1.0, 32, 1)
-    many = measure(jax.vmap(run), collective + jnp.linspace(-0.02, 0.02, 1000), repeats=3)
-    results["step_of_1000_rotors"] = {**many, "step_us": 1e6 * many["median_s"] / steps}
+    for name, flapping in {"": False, "_flapping": True}.items():
+        model = moving(1, 3, "quasi-steady", flapping=flapping)
+        run, (collective,), steps = march(model, 1.0, 32, 1)
+        many = measure(jax.vmap(run), collective + jnp.linspace(-0.02, 0.02, 1000), repeats=9)
+        results[f"step_of_1000_rotors{name}"] = {**many, "step_us": 1e6 * many["median_s"] / steps}
     for name, settings in {
         "dynamic_m1_pitching": (1, 3, "dynamic", 5.0),
+        "dynamic_m1_pitching_flapping": (1, 3, "dynamic", 5.0, True, True),
         "dynamic_m4": (4, 6, "dynamic", 0.0),
+        "dynamic_m4_flapping": (4, 6, "dynamic", 0.0, True, True),
     }.items():
         run, arguments, steps = march(moving(*settings), 60.0, 32 if settings[0] == 4 else 16, 8)
         results[f"landing_60_s_{name}"] = {**measure(run, *arguments, repeats=3), "steps": steps}
@@ -131,7 +143,7 @@ def main() -> None:
     results |= dynamic_cases()
     for name, result in results.items():
         print(
-            f"{name:44s} median {1e3 * result['median_s']:9.3f} ms   compile {result['compile_s']:6.2f} s"
+            f"{name:46s} median {1e3 * result['median_s']:9.3f} ms   compile {result['compile_s']:6.2f} s"
             + (f"   step {result['step_us']:8.1f} µs" if "step_us" in result else "")
         )
     if options.json:

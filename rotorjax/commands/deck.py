@@ -45,9 +45,10 @@ def run(chosen: argparse.Namespace) -> int:
         if chosen.gif:
             bar.set_postfix_str("animation")
             deck_output.animation(data, out / "animation.gif")
-    lines = {name: found["histories"][name] for name in ("height", "uniform", "cosine", "thrust")}
-    for name, row in lines.items():
-        print(f"{name:8s} " + "  ".join(f"{key} {row[key]:9.5f}" for key in ("first", "last", "min", "max")))
+    for name in ("height", "uniform", "cosine", "thrust", *deck_output.FLAPPING):
+        if name in data:  # rigid blades do not flap
+            row = "  ".join(f"{key} {value:9.5f}" for key, value in found["histories"][name].items())
+            print(f"{name:8s} {row}  {data[name].attrs['units']}")
     most = found["largest_difference_from_static"]
     print(
         f"{found['simulated_s']:.1f} s in {found['steps']} steps of {found['step_us']:.0f} µs; the mean inflow differs "

@@ -1,7 +1,7 @@
 """Blade loads of an inflow, as pressure coefficients: linear aerodynamics, or the sections of a real rotor.
 
 Loads are taken at K azimuths and R radii of the disk and averaged over the blades' passage (Eq. 17). A blade at ψ moves
-through the wind with u_T = r + μ sin ψ; the inflow through the disk, climb included, is u_P.
+through the wind with u_T = r + μ sin ψ; the inflow through the disk, climb and flapping included, is u_P.
 """
 
 from abc import abstractmethod
@@ -61,13 +61,13 @@ class Blades(eqx.Module):
 
     @abstractmethod
     def loading(
-        self, down: Float[Array, "K R"], collective: Float[Array, ""], mu: Float[Array, ""], at: Stations
+        self, down: Float[Array, "K R"], pitch: Float[Array, "*#K"], mu: Float[Array, ""], at: Stations
     ) -> Float[Array, "K R"]:
-        """Return dC_T/dr̄ at stations where the inflow, climb included, is `down` over ΩR; collective in rad."""
+        """Return dC_T/dr̄ at stations where u_P is `down` over ΩR; pitch (rad): without twist, () or (K, 1)."""
 
 
 class LinearBlades(Blades):
-    """dC_T/dr̄ = ½ σ a u_T (θ u_T − u_P), θ = collective + twist · r.
+    """dC_T/dr̄ = ½ σ a u_T (θ u_T − u_P), θ = pitch + twist · r.
 
     solidity (): σ. lift_slope (): a (per rad). twist (): rad from hub to tip.
     """
@@ -77,11 +77,11 @@ class LinearBlades(Blades):
     twist: Float[Array, ""]
 
     def loading(
-        self, down: Float[Array, "K R"], collective: Float[Array, ""], mu: Float[Array, ""], at: Stations
+        self, down: Float[Array, "K R"], pitch: Float[Array, "*#K"], mu: Float[Array, ""], at: Stations
     ) -> Float[Array, "K R"]:
-        """Return dC_T/dr̄ at stations where the inflow, climb included, is `down` over ΩR; collective in rad."""
+        """Return dC_T/dr̄ at stations where u_P is `down` over ΩR; pitch (rad): without twist, () or (K, 1)."""
         u = at.r + mu * jnp.sin(at.psi)[:, None]
-        return self.solidity * self.lift_slope / 2 * u * ((collective + self.twist * at.r) * u - down)
+        return self.solidity * self.lift_slope / 2 * u * ((pitch + self.twist * at.r) * u - down)
 
 
 def linear_blades(solidity: float, lift_slope: float = 5.73, twist: float = 0.0) -> LinearBlades:
@@ -99,9 +99,9 @@ class SectionBlades(Blades):
     operating: OperatingPoint
 
     def loading(
-        self, down: Float[Array, "K R"], collective: Float[Array, ""], mu: Float[Array, ""], at: Stations
+        self, down: Float[Array, "K R"], pitch: Float[Array, "*#K"], mu: Float[Array, ""], at: Stations
     ) -> Float[Array, "K R"]:
-        """Return dC_T/dr̄ at stations where the inflow, climb included, is `down` over ΩR; collective in rad."""
+        """Return dC_T/dr̄ at stations where u_P is `down` over ΩR; pitch (rad): without twist, () or (K, 1)."""
         u = at.r + mu * jnp.sin(at.psi)[:, None]
-        loads = section_loads(self.rotor, self.operating, at.r, jnp.broadcast_to(u, down.shape), down, collective)
+        loads = section_loads(self.rotor, self.operating, at.r, jnp.broadcast_to(u, down.shape), down, pitch)
         return disk_loading(self.rotor, loads)

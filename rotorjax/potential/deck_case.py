@@ -3,6 +3,7 @@
     [rotor]
     name = "uh60"              # of the catalogue, or a rotor file beside this one
     collective_deg = 17.0      # the rotor file's by default
+    rigid = false              # by default blades flap where the rotor has hinge data
 
     [model]                    # all optional
     variant = "dynamic"        # static, quasi-steady or dynamic
@@ -46,7 +47,7 @@ from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.rotor_file import closest
 
 _KEYS = {
-    "rotor": {"name": "uh60", "collective_deg": None},
+    "rotor": {"name": "uh60", "collective_deg": None, "rigid": None},
     "model": {"variant": "dynamic", "harmonics": 1, "radial_terms": 3},
     "time": {"duration": None, "steps_per_turn": 16},
     "path": {"t": None, "height": None, "edge": None},
@@ -57,13 +58,14 @@ _MOST_STEPS = 500_000
 
 @dataclass(frozen=True)
 class DeckCase:
-    """One case. t, height, edge (P,): points of the path (s, over R), edge None for a deck without one. duration (s).
-    heave (over R), pitch (rad): amplitudes, with periods in s; edge_azimuth (rad).
+    """One case. rigid: blades do not flap. t, height, edge (P,): points of the path (s, over R), edge None for a deck
+    without one. duration (s). heave (over R), pitch (rad): amplitudes, with periods in s; edge_azimuth (rad).
     """
 
     rotor: Rotor
     operating: OperatingPoint
     collective: float
+    rigid: bool
     variant: Variant
     harmonics: int
     radial_terms: int
@@ -89,7 +91,7 @@ class DeckCase:
         return np.linspace(0.0, self.duration * self.omega, steps + 1)
 
     def motion(self, psi: Float[np.ndarray, " T"]) -> dict[str, Float[np.ndarray, " T"]]:
-        """Return height, slope, edge, their rates and the hub's climb at azimuths, in rotor units."""
+        """Return height, slope, edge, their rates, the hub's climb and its rate at azimuths, in rotor units."""
         t, omega = psi / self.omega, self.omega
         path = PchipInterpolator(self.t, self.height)
         turn, rock = 2 * np.pi / self.heave_period, 2 * np.pi / self.pitch_period
@@ -101,6 +103,7 @@ class DeckCase:
             "height_rate": climb - self.heave * turn / omega * np.cos(turn * t),
             "slope_rate": self.pitch * rock / omega * np.cos(rock * t),
             "climb": climb,
+            "climb_rate": path(t, 2) / omega**2,
             "edge": edge,
         }
 
@@ -163,6 +166,7 @@ def _build(data: dict[str, dict[str, Any]], folder: Path) -> DeckCase:
         rotor=rotor,
         operating=operating,
         collective=float(np.deg2rad(collective)),
+        rigid=_rigid(data["rotor"]["rigid"], rotor),
         variant=model["variant"],
         **whole,
         duration=_number("duration", time["duration"], 0, np.inf, open_=True),
@@ -202,6 +206,14 @@ def _number(name: str, value: object, low: float, high: float, open_: bool = Fal
 def _whole(name: str, value: object, low: int, high: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise InputError(f"Argument `{name}` must be a whole number from {low} to {high}, but is {value!r}")
+    return value
+
+
+def _rigid(value: object, rotor: Rotor) -> bool:
+    if value is None:
+        return rotor.hinge is None
+    if not isinstance(value, bool) or not (value or rotor.hinge is not None):
+        raise InputError(f"[rotor] rigid must be true, or false for a rotor with hinge data, but is {value!r}")
     return value
 
 

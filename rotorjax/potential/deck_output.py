@@ -13,11 +13,13 @@ from rotorjax import plotting
 from rotorjax.io.atomic import whole_file
 
 DYNAMIC, STATIC = plotting.FREE_WAKE, plotting.VPBFSM
+FLAPPING = {"beta_0": r"$\beta_0$", "beta_1c": r"$\beta_{1c}$", "beta_1s": r"$\beta_{1s}$"}
 _SNAPSHOTS = 4
 
 
 def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
     """Return the numbers of report.json: measured figures, and extremes, ends and lag of the histories."""
+    names = ("height", "slope", "uniform", "cosine", "sine", "thrust", "static_uniform", "static_thrust", *FLAPPING)
     series = {
         name: {
             "first": float(data[name][0]),
@@ -25,7 +27,8 @@ def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
             "min": float(data[name].min()),
             "max": float(data[name].max()),
         }
-        for name in ("height", "slope", "uniform", "cosine", "sine", "thrust", "static_uniform", "static_thrust")
+        for name in names
+        if name in data
     }
     steady = data["static_uniform"].values
     difference = np.abs(data["uniform"].values - steady)
@@ -50,10 +53,11 @@ def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
 
 
 def histories(data: xr.Dataset) -> Figure:
-    """Draw the deck's motion, the inflow's three parts and the thrust over time, beside the static ground effect."""
+    """Draw deck's motion, inflow's three parts, thrust and flapping over time, beside the static ground effect."""
+    flapping = "beta_0" in data
     with plotting.style():
-        figure = plotting.new_figure(7.5, 8.0)
-        axes = figure.subplots(4, 1, sharex=True)
+        figure = plotting.new_figure(7.5, 9.8 if flapping else 8.0)
+        axes = figure.subplots(5 if flapping else 4, 1, sharex=True)
         t = data["time"].values
         axes[0].plot(t, data["height"], color=plotting.INK, label="hub over deck, h/R")
         if float(data["has_edge"]):
@@ -72,7 +76,9 @@ def histories(data: xr.Dataset) -> Figure:
         axes[2].plot(t, data["sine"], color="#009E73", lw=1.0, label=r"$\lambda_{1s}$")
         axes[2].legend(ncols=3, loc="best")
         _pair(axes[3], t, data["thrust"], data["static_thrust"], r"$C_T$", data.attrs["variant"])
-        axes[3].set_xlabel("time, s")
+        if flapping:
+            _flapping(axes[4], data)
+        axes[-1].set_xlabel("time, s")
         axes[0].set_xlim(float(t[0]), float(t[-1]))
     return figure
 
@@ -82,6 +88,20 @@ def _pair(axes: Any, t: np.ndarray, ours: xr.DataArray, steady: xr.DataArray, la
     axes.plot(t, ours, color=DYNAMIC, label=name)
     axes.set_ylabel(label)
     axes.legend(ncols=2, loc="best")
+
+
+def _flapping(axes: Any, data: xr.Dataset) -> None:
+    """Tilt of the tip-path plane and, on the right, coning; dashed what is steady at each instant."""
+    right = axes.twinx()
+    right.grid(visible=False)
+    lines = []
+    for side, name, colour in ((axes, "beta_1c", DYNAMIC), (axes, "beta_1s", "#009E73"), (right, "beta_0", "#56B4E9")):
+        label = FLAPPING[name] + (" (right)" if side is right else "")
+        side.plot(data["time"], data[f"static_{name}"], color=colour, ls="--", lw=0.9)
+        lines += side.plot(data["time"], data[name], color=colour, lw=1.1, label=label)
+    axes.set_ylabel("tilt, deg")
+    right.set_ylabel("coning, deg")
+    axes.legend(lines, [line.get_label() for line in lines], ncols=3, loc="best")
 
 
 def snapshots(data: xr.Dataset) -> Figure:

@@ -20,12 +20,18 @@ from rotorjax.potential.ground_table import disk_modes, ground_table
 from rotorjax.potential.march import History, simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model
 from rotorjax.potential.moving_ground import GroundMotion, Variant, ground_states, residual
-from rotorjax.potential.over_ground import Controls, OverGround, controls, output, over_ground, trim
+from rotorjax.potential.over_ground import Controls, Output, OverGround, controls, output, over_ground, trim
 from rotorjax.potential.region import half_plane
+from rotorjax.potential.tip_path import tip_path
 from rotorjax.potential.wake_transport import WakeTransport, wake_transport
 
 SAVED_PER_TURN = 2
 FRAMES = 60  # instants at which the field over the disk and the ground condition are kept
+FLAPPING = {
+    "0": "coning of the blades, up positive",
+    "1c": "tilt of the tip-path plane, up aft",
+    "1s": "tilt of the tip-path plane, up to starboard",
+}
 GRID_R, GRID_PSI = np.linspace(0.0, 0.97, 24), 2 * np.pi / 36 * np.arange(36)
 
 
@@ -72,10 +78,11 @@ def build(case: DeckCase, variant: Variant | None = None) -> tuple[OverGround, F
     )
     blades = SectionBlades(case.rotor, case.operating)
     at = stations(float(case.rotor.root_cutout), 8, max(6, 2 * case.harmonics + 2))
-    model = over_ground(rotor, table, blades, variant, transport, at)
+    flapping = None if case.rigid else tip_path(case.rotor, case.operating)
+    model = over_ground(rotor, table, blades, variant, transport, at, flapping)
     ground = GroundMotion(*(jnp.asarray(motion[k]) for k in ("height", "slope", "height_rate", "slope_rate")))
-    given = controls(ground, rotor, case.collective, jnp.asarray(motion["climb"]), edge=jnp.asarray(motion["edge"]))
-    return model, psi, given
+    along = {name: jnp.asarray(motion[name]) for name in ("climb", "climb_rate", "edge")}
+    return model, psi, controls(ground, rotor, case.collective, **along)
 
 
 def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
@@ -113,9 +120,9 @@ def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
 
 
 def _trimmed(model: OverGround, first: Controls, case: DeckCase):
-    still = eqx.tree_at(lambda c: (c.climb, c.ground.height_rate, c.ground.slope_rate), first, (jnp.zeros(()),) * 3)
+    still = eqx.tree_at(lambda c: (c.ground.height_rate, c.ground.slope_rate), first, (jnp.zeros(()),) * 2)
     try:
-        state = trim(model, still)
+        state = trim(model, _without_climb(still))
     except RuntimeError:
         state = None
     if state is None or not float(state.a[model.rotor.modes.index(0, 1)]) > 0:
@@ -124,25 +131,28 @@ def _trimmed(model: OverGround, first: Controls, case: DeckCase):
     return state
 
 
-def _static(case: DeckCase, kept: Controls) -> Float[Array, "3 T"]:
-    """Mean inflow, cosine harmonic and thrust in the steady state of each instant's geometry."""
+def _without_climb(now: Controls) -> Controls:
+    return eqx.tree_at(lambda c: (c.climb, c.climb_rate), now, (jnp.zeros_like(now.climb),) * 2)
+
+
+def _static(case: DeckCase, kept: Controls) -> Output:
+    """What the rotor does in the steady state of each instant's geometry."""
     model, _, _ = build(case, "static")
 
     @jax.jit
     def march(guess: Array) -> tuple:
-        def one(a: Array, now: Controls) -> tuple[Array, Array]:
+        def one(a: Array, now: Controls) -> tuple[Array, Output]:
             state = trim(model, now, a)
-            found = output(jnp.zeros(()), state, now, model)
-            return state.a, jnp.stack([found.uniform, found.cosine, found.thrust])
+            return state.a, output(jnp.zeros(()), state, now, model)
 
         return jax.lax.scan(one, guess, kept)
 
-    kept = eqx.tree_at(lambda c: c.climb, kept, jnp.zeros_like(kept.climb))
+    kept = _without_climb(kept)
     first = jax.tree.map(lambda v: v[0], kept)
-    return march(_trimmed(model, first, case).a)[1].T
+    return march(_trimmed(model, first, case).a)[1]
 
 
-def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls, steady: Array) -> xr.Dataset:
+def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls, steady: Output) -> xr.Dataset:
     frames = np.unique(np.linspace(0, history.psi.size - 1, FRAMES).astype(int))
     x, y = GRID_R * np.cos(GRID_PSI)[:, None], GRID_R * np.sin(GRID_PSI)[:, None]
     rotor, out = model.rotor, history.outputs
@@ -154,6 +164,11 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
     def series(values: Array, unit: str, text: str) -> tuple:
         return "time", np.asarray(values), {"units": unit, "long_name": text}
 
+    flapping = {
+        f"{kind}beta_{n}": series(jnp.rad2deg(getattr(values, f"beta_{n}")), "deg", FLAPPING[n] + more)
+        for kind, values, more in (("", out, ""), ("static_", steady, ", steady at each instant"))
+        for n in ([] if case.rigid else FLAPPING)
+    }
     return xr.Dataset(
         {
             "height": series(kept.ground.height, "R", "hub over deck"),
@@ -165,9 +180,10 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
             "cosine": series(out.cosine, "ΩR", "fore-and-aft inflow, positive aft"),
             "sine": series(out.sine, "ΩR", "lateral inflow, positive to starboard"),
             "thrust": series(out.thrust, "-", "thrust coefficient"),
-            "static_uniform": series(steady[0], "ΩR", "mean inflow, steady at each instant"),
-            "static_cosine": series(steady[1], "ΩR", "fore-and-aft inflow, steady at each instant"),
-            "static_thrust": series(steady[2], "-", "thrust coefficient, steady at each instant"),
+            "static_uniform": series(steady.uniform, "ΩR", "mean inflow, steady at each instant"),
+            "static_cosine": series(steady.cosine, "ΩR", "fore-and-aft inflow, steady at each instant"),
+            "static_thrust": series(steady.thrust, "-", "thrust coefficient, steady at each instant"),
+            **flapping,
             "inflow": (("frame", "psi", "r"), np.asarray(field), {"units": "ΩR"}),
             "ground_residual": ("frame", np.asarray(left), {"units": "-", "long_name": "left on the deck, rms"}),
             "frame_time": ("frame", seconds[frames], {"units": "s"}),

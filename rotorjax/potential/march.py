@@ -41,8 +41,8 @@ def simulate(
     def step(state: RotorState, row: tuple[Array, Controls, Controls]) -> tuple[RotorState, None]:
         h, first, last = row
         middle = jax.tree.map(lambda p, q: (p + q) / 2, first, last)
-        half = _moved(state, rhs(h, state, first, model), h / 2, model)
-        return _moved(state, rhs(h, half, middle, model), h, model), None
+        half = _moved(state, rhs(h, state, first, model), h / 2)
+        return _moved(state, rhs(h, half, middle, model), h), None
 
     def stretch(state: RotorState, rows: tuple) -> tuple[RotorState, RotorState]:
         state = jax.lax.scan(step, state, rows)[0]
@@ -57,6 +57,5 @@ def simulate(
     return History(instants, states, outputs)
 
 
-def _moved(state: RotorState, rate: RotorState, h: Array, model: OverGround) -> RotorState:
-    a = state.a + h * rate.a
-    return RotorState(a, state.wake if model.transport is None else state.wake + h * rate.wake)
+def _moved(state: RotorState, rate: RotorState, h: Array) -> RotorState:
+    return jax.tree.map(lambda x, x_dot: x + h * x_dot, state, rate)

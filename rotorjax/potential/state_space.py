@@ -1,8 +1,9 @@
 """A, B, C, D of a rotor over ground at a flight condition, through the package's lineariser.
 
-States: a[i] and wake[k,i]. Inputs: collective, climb, mu, height, height_rate, slope, slope_rate, edge and tau[i], by
-their names in `Controls`. Outputs: those of `over_ground.Output`, uniform, cosine, sine and thrust by default. Time is
-azimuth (rad). Height and its rate are separate inputs: at a frequency ω the plane's heave h e^{iωψ} enters as
+States: a[i], wake[k,i] and, where blades flap, flap[i] and flap_rate[i] (β₀, β₁c, β₁s). Inputs: collective, climb,
+climb_rate, mu, height, height_rate, slope, slope_rate, edge and tau[i], by their names in `Controls`. Outputs: those of
+`over_ground.Output`, uniform, cosine, sine and thrust by default. Time is azimuth (rad). Height and its rate are
+separate inputs, as climb and its rate are: at a frequency ω the plane's heave h e^{iωψ} enters as
 h (B_height + iω B_rate) (`heave_response`).
 """
 
@@ -31,10 +32,14 @@ UNITS = {
     "ground.height_rate": "R/rad",
     "edge": "R",
     "climb": "ΩR",
+    "climb_rate": "Ω²R",
     "mu": "ΩR",
     "uniform": "ΩR",
     "cosine": "ΩR",
     "sine": "ΩR",
+    "beta_0": "rad",
+    "beta_1c": "rad",
+    "beta_1s": "rad",
 }
 
 

@@ -11,7 +11,7 @@ from rotorjax.io import netcdf
 
 LANDING = """
 [rotor]
-name = "caradonna_tung"
+name = "{rotor}"
 [model]
 variant = "{variant}"
 radial_terms = 2
@@ -28,9 +28,9 @@ heave_period = {duration}
 """
 
 
-def case(tmp_path, variant="quasi-steady", duration=0.5, edge=""):
+def case(tmp_path, variant="quasi-steady", duration=0.5, edge="", rotor="caradonna_tung"):
     path = tmp_path / "case.toml"
-    path.write_text(LANDING.format(variant=variant, duration=duration, edge=edge))
+    path.write_text(LANDING.format(variant=variant, duration=duration, edge=edge, rotor=rotor))
     return path
 
 
@@ -48,19 +48,26 @@ def test_landing_writes_everything(tmp_path, capsys):
     assert report["ground_residual_max"] < 0.03
     np.testing.assert_allclose(data["uniform"][0], data["static_uniform"][0], rtol=0.02)
     assert data["uniform"].attrs["units"] == "ΩR"
+    assert "beta_0" not in data  # the rotor has no hinges
     assert matplotlib.image.imread(out / "histories.png").std() > 0.05
     assert "is left on the deck at most" in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_flight_over_an_edge(tmp_path):
+def test_flight_over_an_edge_with_flapping_blades(tmp_path, capsys):
     out = tmp_path / "out"
-    path = case(tmp_path, "dynamic", 0.4, "edge = [-1.4, 0.6]")
+    path = case(tmp_path, "dynamic", 4.0, "edge = [-1.4, 0.6]", "uh60")
     assert main(["deck", "--case", str(path), "--out", str(out)]) == 0
     data = netcdf.read(out / "history.nc")
     assert data["cosine"].max() > 0.001  # more inflow aft, where there is no deck
     assert data["uniform"][-1] < data["uniform"][0]
     assert float(data["ground_residual"].max()) < 0.05
+    most = int(np.abs(data["beta_1s"].values).argmax())
+    tilt, inflow = float(data["beta_1s"][most]), np.rad2deg(float(data["cosine"][most]))
+    assert tilt == pytest.approx(-inflow, rel=0.2)  # down to starboard, a quarter turn after the inflow aft
+    assert data["beta_1s"].attrs == {"units": "deg", "long_name": "tilt of the tip-path plane, up to starboard"}
+    np.testing.assert_allclose(data["beta_0"][0], data["static_beta_0"][0], rtol=0.02)
+    assert "beta_1s  first" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

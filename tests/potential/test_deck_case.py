@@ -34,6 +34,8 @@ def test_motion_and_its_rates(tmp_path):
     np.testing.assert_allclose([case.collective, case.edge_azimuth], np.deg2rad([16.0, 90.0]))
     psi = np.linspace(0, 9.9 * case.omega, 4001)
     motion = case.motion(psi)
+    jumps = np.abs(motion["climb_rate"] - np.gradient(motion["climb"], psi)) > 5e-6
+    assert jumps.sum() <= 2  # where the path bends
     for name in ("height", "slope"):
         rate = np.gradient(motion[name], psi, edge_order=2)
         np.testing.assert_allclose(motion[f"{name}_rate"], rate, atol=5e-6)  # the path bends at its points
@@ -41,6 +43,14 @@ def test_motion_and_its_rates(tmp_path):
     assert np.all(motion["climb"] <= 1e-15)
     np.testing.assert_allclose(np.ptp(motion["slope"]), 2 * np.deg2rad(3), rtol=1e-4)
     np.testing.assert_allclose(case.instants()[-1], 10.0 * case.omega)
+
+
+def test_blades_flap_where_they_have_hinge_data(tmp_path):
+    assert not read(CASE, tmp_path).rigid
+    assert read(CASE.replace('"uh60"', '"uh60"\nrigid = true'), tmp_path).rigid
+    assert read(CASE.replace('"uh60"', '"caradonna_tung"'), tmp_path).rigid
+    with pytest.raises(InputError, match="hinge data, but is False"):
+        read(CASE.replace('"uh60"', '"caradonna_tung"\nrigid = false'), tmp_path)
 
 
 def test_rotor_file_beside_the_case(tmp_path):
@@ -64,6 +74,7 @@ BAD = {
     "pitch_deg = 40.0": ("pitch_deg = 3.0", "but is 40"),
     '[model]\nvariant = "quick"\n[time]': ("[time]", "but is 'quick'"),
     "[model]\nharmonics = 1.5\n[time]": ("[time]", "whole number from 1 to 4, but is 1.5"),
+    'name = "uh60"\nrigid = 1': ('name = "uh60"', "must be true, or false"),
     "heave = = 1": ("heave = 0.1", "must be TOML"),
 }
 

@@ -179,7 +179,7 @@ def test_bad_input(models):
     with pytest.raises(InputError, match="tabulate with the same model"):
         over_ground(ROTOR, model.table, variant="dynamic", transport=TRANSPORT)
     with pytest.raises(InputError, match="must be an equilibrium"):
-        state_space(model, RotorState(2 * state.a, state.wake), now)
+        state_space(model, eqx.tree_at(lambda s: s.a, state, 2 * state.a), now)
     with pytest.raises(InputError, match="'angle'"):
         state_space(model, state, now, inputs=["angle"])
     assert rhs(jnp.zeros(()), state, now, model).a.shape == (6,)
@@ -206,9 +206,9 @@ def test_frequency_response_of_one_state_is_the_analytic_one():
 class UniformlyAccelerating(Blades):
     """The blades of Carpenter and Fridovich: uniform inflow, so a loading ∝ √(1−r²) that accelerates the disk so."""
 
-    def loading(self, down, collective, mu, at):
+    def loading(self, down, pitch, mu, at):
         mean = jnp.sum(2 * at.r * at.widths * down.mean(axis=0))
-        thrust = 0.0423 * 5.73 / 2 * (collective / 3 - mean / 2)
+        thrust = 0.0423 * 5.73 / 2 * (pitch / 3 - mean / 2)
         return jnp.broadcast_to(3 * at.r * jnp.sqrt(1 - at.r**2) * thrust, down.shape)
 
 
@@ -223,7 +223,7 @@ def test_step_of_collective_against_carpenter_and_fridovich(degrees, ratio):
     model = over_ground(free.rotor, free.table, UniformlyAccelerating(), at=stations(0.0, 24, 1))
     now = controls(still(plane(60.0)), model.rotor, theta)
     many = jax.tree.map(lambda v: jnp.broadcast_to(v, (1201, *v.shape)), now)
-    at_rest_ = RotorState(jnp.zeros(4), jnp.zeros((0, 4)))
+    at_rest_ = RotorState(jnp.zeros(4), jnp.zeros((0, 4)), jnp.zeros(0), jnp.zeros(0))
     exact = solve_ivp(
         lambda _, lam: (0.0423 * 5.73 / 2 * (theta / 3 - lam / 2) - 2 * lam**2) / 0.849, (0, 60), [0.0], t_eval=psi
     ).y[0]
