@@ -128,22 +128,6 @@ def test_many_rotors_by_vmap(models):
     np.testing.assert_allclose(eqx.filter_vmap(last)(pitches)[3], last(pitches[3]), rtol=1e-12)
 
 
-@pytest.mark.slow
-def test_gradient_through_a_march(models):
-    model, psi = models["dynamic"], jnp.linspace(0, 4, 21)
-    start = trim(model, at_rest(slope_deg=0.0))
-
-    @jax.jit
-    def f(v):
-        moving = GroundMotion(v[0] + v[1] * jnp.sin(psi), 0 * psi, v[1] * jnp.cos(psi), 0 * psi)
-        return simulate(model, start, psi, controls(moving, ROTOR, v[2])).outputs.thrust[-1]
-
-    v, step = jnp.array([1.0, 0.05, 0.15]), 1e-5
-    differences = [(f(v + step * e) - f(v - step * e)) / (2 * step) for e in np.eye(3)]
-    np.testing.assert_allclose(jax.jacfwd(f)(v), differences, rtol=1e-6)
-    np.testing.assert_allclose(jax.jacrev(f)(v), differences, rtol=1e-6)
-
-
 def test_linear_model_is_named_and_exported(models):
     model, now = models["dynamic"], at_rest()
     linear = state_space(model, trim(model, now), now)
