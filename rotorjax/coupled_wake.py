@@ -4,6 +4,7 @@ The wake knows where the blades are by `wake.model.Flight`, made from the rotor'
 loads are those of the wake's lifting line, at its own stations, which flaps and lags with the blade.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
@@ -12,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax.frames import to_ellipsoidal
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, TurnedPlane
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.blade_element import SectionLoads
 from rotorjax.rotor.flap_lag import Blade, blade_of
@@ -26,7 +27,7 @@ from rotorjax.wake.settings import WakeSettings
 
 
 class CoupledWake(eqx.Module):
-    """Parameters p of a rotor in its free wake, all leaves differentiable. ground: or None for none.
+    """Parameters p of a rotor in its free wake, all leaves differentiable. ground: in level axes, or None for none.
 
     The state's inflow is a `WakeState` of K = B slices, blade 0 first. Climb comes from the hub's motion, not from the
     operating point.
@@ -76,7 +77,7 @@ def coupled_wake(
 
 
 def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
-    """The free wake's model at one instant: wind, turning and height from the hub's motion, flap, lag and pitch of
+    """The free wake's model at one instant: wind, turning and ground from the hub's motion, flap, lag and pitch of
     the blades.
     """
     flight = Flight(
@@ -91,6 +92,8 @@ def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
         lag_rate=blades.lag_rate,
     )
     model = eqx.tree_at(lambda m: m.flight, p._rigid, flight, is_leaf=lambda v: v is None)
+    if p.ground is not None and u.turn is not None:
+        model = replace(model, ground=TurnedPlane(p.ground.height, p.ground.slope, u.turn))
     return driven(model, _inputs(u))
 
 

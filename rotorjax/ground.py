@@ -1,4 +1,7 @@
-"""The ground as a plane, shared by both models. No ground is `None`, never h = inf (its gradients would be NaN)."""
+"""The ground as a plane, shared by both models. No ground is `None`, never h = inf (its gradients would be NaN).
+
+A hub that turns sees the plane turned: `TurnedPlane`, or by pitch alone `pitched`.
+"""
 
 import math
 
@@ -23,6 +26,11 @@ class Plane(eqx.Module):
         """Unit normal, pointing up out of the ground."""
         return jnp.stack([-jnp.sin(self.slope), jnp.zeros_like(self.slope), jnp.cos(self.slope)])
 
+    @property
+    def clearance(self) -> Float[Array, ""]:
+        """Least distance of the disk's rim from the plane, over R; negative where the disk cuts it."""
+        return self.height * jnp.cos(self.slope) - jnp.hypot(self.normal[0], self.normal[1])
+
     def distance(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
         """Height of points above the plane along its normal, over R."""
         return points @ self.normal + self.height * jnp.cos(self.slope)
@@ -34,6 +42,25 @@ class Plane(eqx.Module):
     def reflect_vectors(self, vectors: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
         """Mirror images of vectors: the component along the normal changes sign."""
         return vectors - 2 * (vectors @ self.normal)[..., None] * self.normal
+
+
+class TurnedPlane(Plane):
+    """A plane seen from a hub that has turned. height, slope: of the plane in level axes, under the hub. turn (3, 3):
+    takes level axes into the hub frame (`rotor.hub.RotorInputs.turn`).
+    """
+
+    turn: Float[Array, "3 3"]
+
+    @property
+    def normal(self) -> Float[Array, "3"]:
+        """Unit normal in the hub frame, pointing up out of the ground."""
+        return self.turn @ super().normal
+
+
+def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
+    """The plane seen from a hub whose nose has come up by `pitch` (rad), height along its shaft again."""
+    slope = ground.slope + pitch
+    return Plane(ground.height * jnp.cos(ground.slope) / jnp.cos(slope), slope)
 
 
 def plane(height: float, slope_deg: float = 0.0) -> Plane:

@@ -1,8 +1,10 @@
 """The finite-state potential flow (VPBFSM) as an inflow model: pressure coefficients of the blades' loads drive it.
 
-The model knows a wind along the disk's x axis. A wind from elsewhere is one along x in a frame turned to it: harmonics
-m of states and loads turn by m times its angle, and the rates turn back. In air at rest there is no angle; there the
-rates of a wind along x and of one along y add up, which is exact to first order, so that derivatives are right.
+The model knows a wind along the disk's x axis, and a ground that rises along it. A wind from elsewhere is one along x
+in a frame turned to it: harmonics m of states and loads turn by m times its angle, and the rates turn back. In air at
+rest there is no angle; there the rates of a wind along x and of one along y add up, which is exact to first order, so
+that derivatives are right. Ground that a hub sees turned is handled likewise, but where it rises straight aft or ahead
+it has no derivative by roll.
 """
 
 import equinox as eqx
@@ -10,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, TurnedPlane
 from rotorjax.inflow.interface import DiskLoads, InflowModel
 from rotorjax.inflow.momentum import downward, edgewise, hover_inflow
 from rotorjax.potential import dynamics, loading
@@ -33,8 +35,13 @@ class FiniteStateInflow(InflowModel):
         self, state: Float[Array, " M"], points: Float[Array, "*n 3"], inputs: RotorInputs
     ) -> Float[Array, "*n 3"]:
         """Axial velocity of the disk, the ground's effect included."""
-        over = self._over(inputs)
-        return downward(disk_inflow(dynamics.with_ground(state, over), points[..., 0], points[..., 1], over))
+        over, uphill = self._over(inputs)
+        x, y = points[..., 0], points[..., 1]
+        if uphill is not None:
+            cosine, sine = uphill
+            state = _turn(self.model.modes, cosine, sine) @ state
+            x, y = cosine * x + sine * y, cosine * y - sine * x
+        return downward(disk_inflow(dynamics.with_ground(state, over), x, y, over))
 
     def rate(self, state: Float[Array, " M"], loads: DiskLoads, inputs: RotorInputs) -> Float[Array, " M"]:
         """Eq. 1 under the blades' pressure coefficients (Eq. 2)."""
@@ -60,11 +67,24 @@ class FiniteStateInflow(InflowModel):
         rate = dynamics.rhs(jnp.zeros(()), start, dynamics.RotorInputs(turn @ tau, wind[2], climb), alone)
         return turn.T @ rate.a
 
-    def _over(self, inputs: RotorInputs) -> FiniteStateModel:
-        """The model over ground at the inputs' height."""
+    def _over(self, inputs: RotorInputs) -> tuple[FiniteStateModel, Float[Array, "2"] | None]:
+        """The model over the ground as the hub sees it, and the cosine and sine of the direction in which that rises;
+        None where it rises along x.
+        """
         if self.model.ground is None or inputs.height is None:
-            return self.model
-        return eqx.tree_at(lambda m: m.ground.height, self.model, inputs.height)
+            return self.model, None
+        over = eqx.tree_at(lambda m: m.ground.height, self.model, inputs.height)
+        if inputs.turn is None:
+            return over, None
+        normal = TurnedPlane(inputs.height, self.model.ground.slope, inputs.turn).normal
+        # straight aft or ahead x will do, with either sign of the slope: smooth where the ground is level
+        aside = normal[1] != 0
+        across = jnp.sqrt(jnp.where(aside, normal[0] ** 2 + normal[1] ** 2, 1.0))
+        uphill = jnp.where(aside, -normal[:2] / across, jnp.array([1.0, 0.0]))
+        slope = jnp.arctan2(-normal[:2] @ uphill, normal[2])
+        distance = inputs.height * jnp.cos(self.model.ground.slope)
+        ground = Plane(distance / normal[2], slope)
+        return eqx.tree_at(lambda m: m.ground, over, ground), uphill
 
 
 def _turn(modes: ModeTable, cosine: Float[Array, ""], sine: Float[Array, ""]) -> Float[Array, "M M"]:

@@ -14,7 +14,9 @@ from rotorjax import plotting
 from rotorjax.coupled import inflow_velocity, stations
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.rotor import multiblade
+from rotorjax.rotor.hub import ATTITUDE
 from rotorjax.simulation.film import write_film
+from rotorjax.simulation.ground_view import ground_arrays, ground_line
 from rotorjax.simulation.run import SAVES, Simulated
 from rotorjax.simulation.wake_output import wake_arrays
 
@@ -52,8 +54,10 @@ def dataset(found: Simulated) -> xr.Dataset:
     for name in ("p", "q", "r"):
         data[name] = ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"})
     data["rotor_speed"] = ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})
+    for name in ATTITUDE:
+        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
     if u.height is not None:
-        data["height"] = ("time", np.asarray(u.height), {"long_name": "hub above ground over R"})
+        data = data.assign(ground_arrays(u, found.case.request.slope_deg))
     data["flap"] = (("time", "coordinate"), np.rad2deg(x.rotor.flap), degrees)
     data["lag"] = (("time", "coordinate"), np.rad2deg(x.rotor.lag), degrees)
     data["blade_flap"] = (("time", "blade"), np.rad2deg(y.flap), degrees)
@@ -94,7 +98,9 @@ def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
     """How it went and how fast: seconds of the march per revolution and against the clock."""
     flown_s = float(data["time"][-1])
     turns = float(data["azimuth"][-1]) / (2 * np.pi)
-    names = [n for n in ("height", "CT", "CQ", "rotor_speed", "largest_alpha") if n in data]
+    names = [
+        n for n in ("height", "clearance", "roll", "pitch", "CT", "CQ", "rotor_speed", "largest_alpha") if n in data
+    ]
     series = {n: data[n].values for n in names}
     series |= {f"beta_{c}_deg": data["flap"].sel(coordinate=c).values for c in data["coordinate"].values}
     return {
@@ -191,6 +197,7 @@ def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -
         side.grid(visible=False)
         blades = [side.plot([], [], color=plotting.INK, lw=2)[0] for _ in data["blade"]]
         (floor,) = side.plot([], [], color="#888888", lw=3)
+        ends = np.array([-1.15, 1.15])
 
         def draw(frame: int) -> None:
             at = int(frames[frame])
@@ -201,7 +208,7 @@ def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -
                 blade.set_data([0, np.cos(azimuth) * np.cos(flap)], [0, np.sin(flap)])
                 spoke.set_data([0, np.cos(azimuth)], [0, np.sin(azimuth)])
             if "height" in data:
-                floor.set_data([-1.15, 1.15], 2 * [-float(data["height"][at])])
+                floor.set_data(ends, ground_line(ends, data, at))
             dot.set_data([t[at]], [thrust[at]])
             side.set_title(f"t = {t[at]:.2f} s, flapping ×{large:g}")
 

@@ -14,15 +14,14 @@ from scipy.interpolate import PPoly
 
 from rotorjax.coupled import Coupled, CoupledState, Outputs, output, rhs
 from rotorjax.coupled_wake import CoupledWake
-from rotorjax.errors import InputError
-from rotorjax.inflow.choice import LOWEST
 from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.rotor.hub import RotorInputs
-from rotorjax.simulation.case import FREE_WAKE, SimulationCase, steps_of
+from rotorjax.rotor.hub import ATTITUDE, RotorInputs
+from rotorjax.simulation.case import SimulationCase, steps_of
 from rotorjax.simulation.history import Piecewise, piecewise
+from rotorjax.simulation.path import Above, angles, hub_path
 from rotorjax.simulation.start import Start, start_of
 from rotorjax.simulation.step import instant, steps_per_turn
 
@@ -31,14 +30,14 @@ Progress = Callable[[str], None]
 
 
 class Driver(eqx.Module):
-    """Inputs over time. trim: those at the start. added (10 columns), rates: histories in rotor units over Ω_ref t;
-    height: over R, or None.
+    """Inputs over time. trim: those at the start. added (10 columns), rates: histories in rotor units over Ω_ref t.
+    path: the hub's attitude and height (`simulation.path`).
     """
 
     trim: RotorInputs
     added: Piecewise
     rates: Piecewise
-    height: Piecewise | None
+    path: Piecewise
 
     def __call__(self, t: Float[Array, ""]) -> RotorInputs:
         """The inputs at one instant; rotor speed is set, everything else added."""
@@ -46,7 +45,9 @@ class Driver(eqx.Module):
         names = ("theta_1c", "theta_1s", "theta_0", "u", "v", "w", "p", "q", "r")
         values = {name: getattr(self.trim, name) + extra[k] for k, name in enumerate(names)}
         values |= {f"{name}_rate": rate[k] for k, name in enumerate(names) if k >= 3}
-        height = self.trim.height if self.height is None else self.height(t)[0]
+        way = self.path(t)
+        values |= dict(zip(ATTITUDE, angles(way[:4]), strict=True))
+        height = None if self.trim.height is None else way[4]
         return RotorInputs(**values, omega=extra[9], omega_rate=rate[9], height=height)
 
 
@@ -81,10 +82,8 @@ def driven(t: Float[Array, ""], x: CoupledState, driver: Driver, p: Coupled) -> 
 def driver_of(case: SimulationCase, start: Start) -> Driver:
     """Histories in rotor units. Raises InputError where the hub's path takes the disk into the ground."""
     scaled = _in_rotor_units(case, start.p.rotor, start.p.operating)
-    height = None
-    if start.inputs.height is not None:
-        height = piecewise(hub_path(case, start.p.rotor, start.p.operating, start.tilt))
-    return Driver(start.inputs, piecewise(scaled), piecewise(scaled.derivative()), height)
+    path = path_of(case, start.p.rotor, start.p.operating, start.tilt)
+    return Driver(start.inputs, piecewise(scaled), piecewise(scaled.derivative()), piecewise(path))
 
 
 def _in_rotor_units(case: SimulationCase, rotor: Rotor, operating: OperatingPoint) -> PPoly:
@@ -96,29 +95,18 @@ def _in_rotor_units(case: SimulationCase, rotor: Rotor, operating: OperatingPoin
     return PPoly(told.c * powers[:, None, None] * units, told.x * omega)
 
 
-def hub_path(case: SimulationCase, rotor: Rotor, operating: OperatingPoint, tilt: float) -> PPoly:
-    """Height of the hub over Ω_ref t, over R; tilt of the shaft in rad.
+def path_of(case: SimulationCase, rotor: Rotor, operating: OperatingPoint, tilt: float) -> PPoly:
+    """Attitude and, over ground, height of the hub over Ω_ref t (`simulation.path`); tilt of the shaft (rad).
 
-    Raises InputError where there is no ground, or the path takes the disk into it.
+    Raises InputError where the path takes the disk into the ground, or further than the inflow model knows.
     """
-    if case.request.height is None:
-        raise InputError("[flight] height must be given for a path over ground, but is missing")
-    scaled, omega = _in_rotor_units(case, rotor, operating), float(operating.omega)
-    up = scaled.c @ np.array([0, 0, 0, np.sin(tilt), 0, -np.cos(tilt), 0, 0, 0, 0])
-    path = PPoly(up[..., None], scaled.x).antiderivative()
-    path.c[-1] += case.request.height
-    t = np.linspace(0.0, case.duration * omega, 2001)
-    lowest = abs(np.sin(tilt)) + np.tan(np.deg2rad(case.request.slope_deg))
-    why = "where the disk cuts the ground"
-    if case.request.inflow not in ("vpbfsm", FREE_WAKE) and lowest < LOWEST:
-        lowest, why = LOWEST, "the lowest that Cheeseman and Bennett's source is good for"
-    under = np.flatnonzero(path(t)[:, 0] <= lowest)
-    if under.size:
-        raise InputError(
-            f"[history] the hub's path must stay above {lowest:.3g} R, {why}, "
-            f"but goes below it at {t[under[0]] / omega:.2f} s"
-        )
-    return path
+    scaled, omega, request = _in_rotor_units(case, rotor, operating), float(operating.omega), case.request
+    motion = PPoly(scaled.c[..., 3:9], scaled.x)
+    velocity = request.advance * np.array([np.cos(tilt), 0.0, -np.sin(tilt)])
+    ground = None
+    if request.height is not None:
+        ground = Above(request.height, float(np.deg2rad(request.slope_deg)), request.inflow, omega)
+    return hub_path(motion, velocity, -tilt, case.duration * omega, ground)
 
 
 def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
@@ -126,7 +114,7 @@ def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
     report = progress or (lambda stage: None)
     request = case.request
     if request.height is not None and request.drag_area is None:  # said before the trim's work
-        hub_path(case, *catalogue.load(request.rotor), float(np.deg2rad(request.tilt_deg)))
+        path_of(case, *catalogue.load(request.rotor), float(np.deg2rad(request.tilt_deg)))
     report("trim")
     return fly_from(case, start_of(case, report), report)
 

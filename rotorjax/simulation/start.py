@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from rotorjax.coupled import Coupled, CoupledState, RotorState
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.errors import InputError
+from rotorjax.ground import pitched
 from rotorjax.rotor import catalogue, multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import SimulationCase
@@ -72,10 +73,11 @@ def from_wake(result: WakeResult) -> Start:
     """Start from a trim in the free wake."""
     trimmed = result.trimmed
     model, p = trimmed.model, trimmed.p
-    height = None if model.ground is None else model.ground.height
+    ground = model.ground if model.ground is None else pitched(model.ground, jnp.asarray(result.tilt))
+    height = None if ground is None else ground.height
     theta_0, theta_1c, theta_1s = trimmed.z.controls
     inputs = replace(p.inputs, theta_0=theta_0, theta_1c=theta_1c, theta_1s=theta_1s, height=height)
-    coupled = CoupledWake(model.rotor, model.operating, p.blade, model.ground, model.settings)
+    coupled = CoupledWake(model.rotor, model.operating, p.blade, ground, model.settings)
     return Start(coupled, state_at(trimmed, 0), inputs, result.tilt)
 
 

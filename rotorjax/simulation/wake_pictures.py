@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from rotorjax import plotting
 from rotorjax.simulation.film import write_film
+from rotorjax.simulation.ground_view import ground_line
 
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2)}
 _LABELS = {0: "forward ← x/R → aft", 1: "port ← y/R → starboard", 2: "z/R"}
@@ -100,5 +101,4 @@ def _draw(lines: dict[str, list[Any]], one: xr.Dataset, title: str) -> None:
             line.set_data(path[:, i], path[:, j])
     for line in lines["floor"]:
         x = np.array(line.axes.get_xlim())
-        height, slope = float(one["height"].values[int(one["frame"])]), float(one.attrs["slope_deg"])
-        line.set_data(x, -height + x * np.tan(np.deg2rad(slope)))
+        line.set_data(x, ground_line(x, one, int(one["frame"])))

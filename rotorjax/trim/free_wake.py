@@ -137,6 +137,15 @@ def hub_moment(flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoad
     return mean * jnp.array([0.0, 0.0, 1.0]) if flap.shape[0] == 1 else mean
 
 
+def weight_torque(flap: Float[Array, " K"], lag: Float[Array, " K"], p: WakeTrim) -> Float[Array, " K"]:
+    """Torque of the weight of each blade about a tilted shaft, over ρΩ²R⁵: no mean where they lag alike."""
+    angles = jnp.stack([flap, lag], axis=-1)
+    along = p.blade.mass * p.blade.offset * jnp.array([1.0, 0.0, 0.0])
+    arm = along + p.blade.first_moment * jax.vmap(flap_lag.direction)(angles)
+    up = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity).acceleration)(_azimuths(flap))
+    return -jnp.cross(arm, up)[:, 2] / p.blade.air
+
+
 def _motion(flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoads, p: WakeTrim):
     """Turning frames, angles and rates (flap, lag), and the accelerations that the blades' equations want."""
     frames = jax.vmap(lambda a: turning_frame(p.inputs, a, p.blade.gravity))(_azimuths(flap))

@@ -8,26 +8,29 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, pitched
 from rotorjax.inflow.momentum import hover_inflow
 from rotorjax.ode.anderson import anderson
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor.flap_lag import blade_of, damper_moment, lag_frequency
+from rotorjax.rotor.flap_lag import blade_of, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.rotor.moving_blade import AirLoads
-from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, harmonic, hub_moment, loads_of, residual
+from rotorjax.trim.free_wake import (
+    InWake,
+    WakeTrim,
+    first_guess,
+    flown,
+    residual,
+)
 from rotorjax.trim.problem import Aim
-from rotorjax.wake.equilibrium import Evaluation, evaluate
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 from rotorjax.wake.solution import solve
@@ -56,23 +59,6 @@ class TrimmedInWake:
         return flown(self.z, self.p)
 
 
-@dataclass(frozen=True)
-class Means:
-    """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s and lagging ζ₀, ζ₁c,
-    ζ₁s (rad), moment (3,) on the hub over ρA(ΩR)²R, hub frame.
-    """
-
-    CT: float
-    CQ: float
-    CP_induced: float
-    CP_profile: float
-    CP_parasite: float
-    CP_damper: float
-    flap: np.ndarray
-    lag: np.ndarray
-    moment: np.ndarray
-
-
 def wake_trim(
     rotor: Rotor,
     operating: OperatingPoint,
@@ -82,13 +68,21 @@ def wake_trim(
     settings: WakeSettings | None = None,
     aim: Aim = "flapping",
 ) -> WakeTrim:
-    """Set a trim up.
+    """Set a trim up. ground: in level axes; the trim's model has it as the tilted shaft sees it.
 
-    Raises InputError where the rotor has no hinge data or nothing holds its blades in lag, or as `free_wake` does.
+    Raises InputError where the rotor has no hinge data or nothing holds its blades in lag, the disk cuts the ground, or
+    as `free_wake` does.
     """
     if settings is None:
         settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
+    if ground is not None and inputs.pitch is not None:
+        ground = pitched(ground, inputs.pitch)
+    if ground is not None and not float(ground.clearance) > 0:
+        raise InputError(
+            f"Argument `ground` must lie under the disk, but the tilted disk's rim is {-float(ground.clearance):.3g} R "
+            "under it: set a greater height or less tilt"
+        )
     model = free_wake(rotor, still, ground, settings)
     blade = blade_of(rotor, operating)
     if not float(lag_frequency(blade)) > 0:
@@ -110,57 +104,19 @@ def trim_in_wake(
     """Trim from a guess of the controls θ₀, θ₁c, θ₁s and of the coning (rad).
 
     progress(stage, residual) is called as things go on. A trim that does not converge comes back with its reason.
-    Raises InputError where the hub climbs over ground.
+    Raises InputError where the hub comes nearer to the ground or leaves it.
     """
-    if p.model.ground is not None and float(p.inputs.climb) != 0:
+    ground = p.model.ground
+    nearer = 0.0 if ground is None else float(ground.normal @ p.inputs.velocity)
+    if abs(nearer) > 1e-12:
         raise InputError(
-            f"Argument `inputs` must not move along the shaft over ground (a steady state needs a fixed height), but "
-            f"its climb is {float(p.inputs.climb):g}: set tilt = 0 and climb = 0"
+            f"Argument `inputs` must keep its height over the ground (a steady state needs it), but the hub moves at "
+            f"{nearer:.3g} ΩR away from it: set climb = 0, and advance_ratio = 0 over a slope"
         )
     stages = _Stages(progress)
     if windy(p.inputs):
         return _from_wind(p, controls, coning, stages)
     return _from_hover(p, controls, coning, stages)
-
-
-def means(found: TrimmedInWake) -> Means:
-    """Performance of a trim."""
-    _, loads = evaluated(found.z, found.p)
-    z, p, blades = found.z, found.p, found.p.model.rotor.blades
-    model = found.model
-    flight = model.flight
-    assert flight is not None
-    assert flight.lag_rate is not None
-    place = jax.vmap(lambda k: model.of_slice(k).control)(jnp.arange(z.flap.shape[0]))
-    torque = jnp.cross(place, loads.per_length)[..., 2]
-    psi = 2 * jnp.pi / z.flap.shape[0] * jnp.arange(z.flap.shape[0])
-
-    def mean(power) -> float:
-        return float(blades / jnp.pi * jnp.mean(power))
-
-    force = loads.force
-    along = force[:, 0] * jnp.cos(psi) - force[:, 1] * jnp.sin(psi)
-    across = force[:, 0] * jnp.sin(psi) + force[:, 1] * jnp.cos(psi)
-    hub = jnp.stack([along, across, force[:, 2]], axis=-1)
-    return Means(
-        CT=mean(force[:, 2]),
-        CQ=mean(-torque @ model.widths),
-        CP_induced=mean(loads.induced),
-        CP_profile=mean(loads.profile),
-        CP_parasite=mean(hub @ p.inputs.velocity),
-        CP_damper=mean(damper_moment(p.blade, flight.lag_rate) * flight.lag_rate / p.blade.air),
-        flap=np.asarray(harmonic(z.flap)),
-        lag=np.asarray(harmonic(z.lag)),
-        moment=np.asarray(hub_moment(z.flap, z.lag, loads, p)),
-    )
-
-
-@eqx.filter_jit
-def evaluated(z: InWake, p: WakeTrim) -> tuple[Evaluation, AirLoads]:
-    """Wake and air loads of unknowns."""
-    model = flown(z, p)
-    found = evaluate(model, z.wake)
-    return found, loads_of(model, found)
 
 
 class _Stages:

@@ -12,8 +12,9 @@ from rotorjax.ground import plane
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import solidity
 from rotorjax.trim import run as trim_run
-from rotorjax.trim.in_wake import Progress, TrimmedInWake, means, trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import Progress, TrimmedInWake, trim_in_wake, wake_trim
 from rotorjax.trim.problem import inputs_at, outputs_at
+from rotorjax.trim.wake_means import means
 from rotorjax.wake.settings import WakeSettings
 
 NAME = "freewake"

@@ -69,6 +69,9 @@ def inputs_at(controls: Controls, flight: Flight) -> RotorInputs:
         w=-flight.advance * sine - flight.climb * cosine,
         omega=jnp.ones_like(controls.tilt),
         height=flight.height,
+        roll=zero,
+        pitch=-controls.tilt,
+        heading=zero,
     )
 
 

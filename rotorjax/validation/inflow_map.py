@@ -22,11 +22,11 @@ from rotorjax.potential.dynamics import with_ground
 from rotorjax.potential.model import velocity
 from rotorjax.rotor.geometry import chord
 from rotorjax.trim.dispatch import ALL, numbers_of, trim_request
-from rotorjax.trim.in_wake import evaluated
 from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
 from rotorjax.trim.in_wake_run import WakeResult
 from rotorjax.trim.problem import inputs_at
 from rotorjax.trim.run import Request, Result
+from rotorjax.trim.wake_means import evaluated
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.point import Point
 from rotorjax.validation.row import Against, Row, between, relative

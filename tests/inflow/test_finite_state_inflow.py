@@ -98,3 +98,17 @@ def test_the_ground_takes_inflow_away_and_less_of_it_higher_up(found):
     down, _, slope = found["hover"]
     assert float(jnp.mean(down)) < np.sqrt(THRUST / 2)
     assert float(jnp.mean(slope)) > 0
+
+
+def test_a_disk_that_stands_askew_sees_a_slope(model):
+    """Nose up over level ground is upright over ground that rises aft; rolled to starboard, the same a quarter on."""
+    points, slope = elliptic_loads().points, 0.2
+    x = model.start(jnp.asarray(THRUST), rotor_inputs(height=1.0))
+    velocity = eqx.filter_jit(lambda model, x, points, u: model.velocity(x, points, u))
+    sloping = eqx.tree_at(lambda m: m.model.ground.slope, model, jnp.asarray(slope))
+    upright = velocity(sloping, x, points, rotor_inputs(height=1 / np.cos(slope), pitch=0.0))
+    np.testing.assert_allclose(velocity(model, x, points, rotor_inputs(height=1.0, pitch=slope)), upright, atol=1e-14)
+    quarter = jnp.stack([-points[..., 1], points[..., 0], points[..., 2]], axis=-1)
+    rolled = velocity(model, x, quarter, rotor_inputs(height=1.0, roll=slope))
+    np.testing.assert_allclose(rolled, upright, atol=1e-14)
+    assert float(jnp.ptp(upright[..., 2])) > 1e-3

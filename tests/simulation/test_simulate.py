@@ -5,6 +5,7 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
 from rotorjax.cli import main
@@ -89,8 +90,11 @@ def test_inputs_of_a_descent(tmp_path):
     assert float(u.w) == pytest.approx(2.0 / tip, rel=1e-6)
     assert float(u.q) == pytest.approx(np.deg2rad(1.0) / omega, rel=1e-6)
     assert float(u.omega) == pytest.approx(0.99)
-    path = PchipInterpolator([0.0, 0.25, 0.3, 0.5], [0.0, 2, 2, 2]).antiderivative()
-    assert float(u.height) == pytest.approx(1.0 - path(0.4) / 8.177784, rel=1e-9)
+    down = PchipInterpolator([0.0, 0.25, 0.3, 0.5], [0.0, 2, 2, 2])
+    nose = PchipInterpolator([0.0, 0.25, 0.3, 0.5], np.deg2rad([0.0, 1, 1, 1])).antiderivative()
+    assert float(u.pitch) == pytest.approx(nose(0.4), abs=1e-10)
+    sunk = quad(lambda t: down(t) * np.cos(nose(t)), 0.0, 0.4, epsabs=1e-12)[0]
+    assert float(u.height) == pytest.approx(1.0 - sunk / 8.177784, rel=1e-9)
     now, step = 0.1 * omega, 1e-5
     slope = (driver(jnp.asarray(now + step)).w - driver(jnp.asarray(now - step)).w) / (2 * step)
     assert float(driver(jnp.asarray(now)).w_rate) == pytest.approx(float(slope), rel=1e-6)
@@ -100,10 +104,10 @@ def test_inputs_of_a_descent(tmp_path):
 def test_a_path_into_the_ground_is_refused(tmp_path):
     history = HISTORY + "w = [0.0, 9.0, 9.0, 9.0]\n"
     case = read_case(write(tmp_path, FLIGHT.replace("pitt-peters", "vpbfsm"), "height = 0.3\n", TIME, history))
-    with pytest.raises(InputError, match=r"above 0 R.*at 0\.\d\d s"):
+    with pytest.raises(InputError, match=r"cuts it at 0\.\d\d s, to -"):
         driver_of(case, started(case))
     low = read_case(write(tmp_path, FLIGHT, "height = 0.6\n", TIME, history))
-    with pytest.raises(InputError, match=r"above 0\.5 R"):
+    with pytest.raises(InputError, match=r"above 0\.5 R.*goes below it"):
         driver_of(low, started(low))
 
 

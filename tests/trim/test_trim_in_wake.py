@@ -17,9 +17,10 @@ from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
 from rotorjax.trim.dispatch import check_request
 from rotorjax.trim.free_wake import hub_moment, residual
-from rotorjax.trim.in_wake import evaluated, means, trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import trim_in_wake, wake_trim
 from rotorjax.trim.in_wake_run import WakeResult, run_in_wake, wake_numbers
 from rotorjax.trim.run import Request
+from rotorjax.trim.wake_means import evaluated, means
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 THRUST = 0.0058
@@ -143,5 +144,5 @@ def test_what_the_free_wake_cannot_do_is_refused():
         check_request(Request("uh60", THRUST, "freewak"))
     climbing = rotor_inputs(w=-0.02, height=1.0)
     p = wake_trim(*load("uh60"), climbing, THRUST, plane(1.0))
-    with pytest.raises(InputError, match="its climb is"):
+    with pytest.raises(InputError, match="away from it: set climb = 0"):
         trim_in_wake(p, jnp.zeros(3), 0.0)
