@@ -174,7 +174,9 @@ def _side_view(axes: Any, now: xr.Dataset, highest: float) -> None:
     end = float(now["edge"]) if float(now["has_edge"]) else 2.0
     slope = np.tan(np.deg2rad(float(now["slope"])))
     height = float(now["height"])
-    axes.plot([-1, 1], [0, 0], color=plotting.INK, lw=3, solid_capstyle="round")
+    cone, tilt = (np.deg2rad(float(now[name])) if name in now else 0.0 for name in ("beta_0", "beta_1c"))
+    tips = [np.sin(cone - tilt), 0.0, np.sin(cone + tilt)]  # of the blades ahead and aft
+    axes.plot([-1, 0, 1], tips, color=plotting.INK, lw=3, solid_capstyle="round", solid_joinstyle="round")
     axes.plot([0], [0], "o", color=plotting.INK, ms=5)
     start = -2.0
     if end > start:

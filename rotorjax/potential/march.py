@@ -1,4 +1,8 @@
-"""The march of a rotor over ground (`over_ground.py`) along given inputs, from a trimmed state or any other."""
+"""The march of a rotor over ground (`over_ground.py`) along given inputs, from a trimmed state or any other.
+
+The rule is explicit, and flapping bounds its step: the tip-path plane's fast tilt turns at about two per rev, damped by
+γ/16. With 16 steps a turn it stays bounded down to a Lock number γ of 2, with 12 down to 4.
+"""
 
 from typing import NamedTuple
 
