@@ -152,14 +152,6 @@ def _build(data: dict[str, dict[str, Any]], folder: Path) -> DeckCase:
         raise InputError(f"[model] variant must be one of {get_args(Variant)}, but is {model['variant']!r}")
     given = data["rotor"]["collective_deg"]
     collective = np.rad2deg(float(operating.collective)) if given is None else _number("collective_deg", given, -90, 90)
-    whole = {
-        key: _whole(key, value, low, high)
-        for key, value, low, high in (
-            ("harmonics", model["harmonics"], 1, 4),
-            ("radial_terms", model["radial_terms"], 1, 5),
-            ("steps_per_turn", time["steps_per_turn"], 12, 720),
-        )
-    }
     t, height = _points("t", data["path"]["t"]), _points("height", data["path"]["height"])
     edge = None if data["path"]["edge"] is None else _points("edge", data["path"]["edge"])
     case = DeckCase(
@@ -168,7 +160,9 @@ def _build(data: dict[str, dict[str, Any]], folder: Path) -> DeckCase:
         collective=float(np.deg2rad(collective)),
         rigid=_rigid(data["rotor"]["rigid"], rotor),
         variant=model["variant"],
-        **whole,
+        harmonics=_whole("harmonics", model["harmonics"], 1, 4),
+        radial_terms=_whole("radial_terms", model["radial_terms"], 1, 5),
+        steps_per_turn=_whole("steps_per_turn", time["steps_per_turn"], 12, 720),
         duration=_number("duration", time["duration"], 0, np.inf, open_=True),
         t=t,
         height=height,

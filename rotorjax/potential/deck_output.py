@@ -182,8 +182,9 @@ def _side_view(axes: Any, now: xr.Dataset, highest: float) -> None:
     if end > start:
         ends = np.array([start, min(end, 2.0)])
         axes.fill_between(ends, -height + slope * ends, -highest - 0.6, color="#999999", lw=0)
-    deep = [-height + slope * side if side < end else -highest - 0.6 for side in (-1, 1)]
-    axes.fill([-1, 1, 1, -1], [0, 0, deep[1], deep[0]], color=DYNAMIC, alpha=0.12, lw=0)
+    x = np.array([-1.0, *np.repeat(np.clip(end, -1, 1), 2), 1.0])
+    deep = np.where([end > -1, end > -1, end >= 1, end >= 1], -height + slope * x, -highest - 0.6)
+    axes.fill([*x, 1, -1], [*deep, 0, 0], color=DYNAMIC, alpha=0.12, lw=0)
     axes.set(xlim=(-2, 2), ylim=(-highest - 0.6, 0.6), aspect="equal", title=f"t = {float(now['time']):.1f} s")
     axes.set(xticks=[], yticks=[])
     axes.set_xlabel("forward ← → aft", fontsize=8)

@@ -140,8 +140,7 @@ def controls(
     def held(value: Float[Array, "*T"] | float) -> Float[Array, "*T"]:
         return jnp.broadcast_to(jnp.asarray(value, float), shape)
 
-    tau = jnp.zeros(len(model.modes)) if tau is None else tau
-    tau = jnp.broadcast_to(tau, (*shape, len(model.modes)))
+    tau = jnp.broadcast_to(0.0 if tau is None else tau, (*shape, len(model.modes)))
     return Controls(ground, held(edge), held(collective), held(mu), held(climb), held(climb_rate), tau)
 
 
@@ -211,14 +210,13 @@ def trim(model: OverGround, now: Controls, guess: Float[Array, " M"] | None = No
     if model.tip_path is not None:
         guess = jnp.concatenate([guess, jnp.zeros(3)])
 
+    def settled(x: Array) -> RotorState:
+        a, flap = x[:count], x[count:]
+        wake = jnp.zeros((0, count)) if model.transport is None else model.transport.settled(a)
+        return RotorState(a, wake, flap, jnp.zeros_like(flap))
+
     def residual(x: Array, _: None) -> Array:
-        rate = rhs(jnp.zeros(()), _settled(x[:count], x[count:], model), now, model)
+        rate = rhs(jnp.zeros(()), settled(x), now, model)
         return jnp.concatenate([rate.a, rate.flap_rate])
 
-    found = optx.root_find(residual, optx.Newton(rtol=1e-11, atol=1e-14), guess, max_steps=60).value
-    return _settled(found[:count], found[count:], model)
-
-
-def _settled(a: Float[Array, " M"], flap: Float[Array, " F"], model: OverGround) -> RotorState:
-    wake = jnp.zeros((0, a.size)) if model.transport is None else model.transport.settled(a)
-    return RotorState(a, wake, flap, jnp.zeros_like(flap))
+    return settled(optx.root_find(residual, optx.Newton(rtol=1e-11, atol=1e-14), guess, max_steps=60).value)
