@@ -154,6 +154,9 @@ def histories(data: xr.Dataset) -> Figure:
         for name in ("p", "q", "r"):
             if float(abs(data[name]).max()) > 1e-9:
                 motion.plot(t, data[name], ls="--", label=f"${name}$, deg/s")
+        for name in ("roll", "pitch"):
+            if float(abs(data[name] - data[name][0]).max()) > 1e-9:
+                motion.plot(t, data[name], ls=(0, (1, 3)), label=f"{name}, deg")
         motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
         if "height" in data:
             motion.plot(t, data["height"], ls="-.", color=plotting.INK, label="height over $R$")

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from matplotlib.figure import Figure
+from scipy.signal import resample
 
 from rotorjax.inflow.finite_state import FiniteStateInflow
 from rotorjax.plotting import new_figure, polar_contour, shared_levels, style
@@ -22,6 +23,7 @@ from rotorjax.potential.dynamics import with_ground
 from rotorjax.potential.model import velocity
 from rotorjax.rotor.geometry import chord
 from rotorjax.trim.dispatch import ALL, numbers_of, trim_request
+from rotorjax.trim.free_wake import InWake, flown
 from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
 from rotorjax.trim.in_wake_run import WakeResult
 from rotorjax.trim.problem import inputs_at
@@ -43,6 +45,9 @@ BETTER = Against(SOURCE, SCATTER, "a model of the inflow has to be better than t
 FAITHFUL = 0.012
 CLOSE = Against(SOURCE, SCATTER, "a free wake has to be clearly the best")
 MEAN = Against(SOURCE, SCATTER, "what momentum theory leaves out of a rotor's mean inflow")
+
+FINER, PARTS = 3, 4
+"""Azimuths of a wake over those of its trim, and points for the arc between two of them."""
 
 Map = Callable[[Float[np.ndarray, "N 2"]], Float[np.ndarray, " N"]]
 """λ over ΩR at places (r, ψ) of the disk."""
@@ -113,16 +118,32 @@ def map_of(result: Result | WakeResult) -> Map:
 
 
 def _wake_map(result: WakeResult) -> Map:
-    """Mean over the azimuths of the free wake."""
-    model = result.trimmed.model
-    state = evaluated(result.trimmed.z, result.trimmed.p)[0].state
+    """Mean over the azimuths of the free wake.
+
+    Blades pass a chord below the points with upflow ahead of them and downflow behind. A few azimuths miss their
+    balance where blades lag: the trim's harmonics are evaluated at more, and points stand for the arc between two.
+    """
+    trimmed = result.trimmed
+    z = _finer(trimmed.z)
+    model, state = flown(z, trimmed.p), evaluated(z, trimmed.p)[0].state
     height = chord(model.rotor, jnp.asarray(0.75))
+    turns = 2 * np.pi / z.flap.shape[0] * ((np.arange(PARTS) + 0.5) / PARTS - 0.5)
 
     def at(places: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, " N"]:
-        flow = _wake_velocity(state, _cartesian(places).at[:, 2].set(height), model)
-        return -np.asarray(jnp.mean(flow, axis=0)[:, 2])
+        arcs = places + np.stack([np.zeros(PARTS), turns], axis=-1)[:, None]
+        flow = _wake_velocity(state, _cartesian(arcs.reshape(-1, 2)).at[:, 2].set(height), model)
+        return -np.asarray(jnp.mean(flow[..., 2], axis=0)).reshape(PARTS, -1).mean(axis=0)
 
     return at
+
+
+def _finer(z: InWake) -> InWake:
+    """The same periodic motion at more azimuths."""
+
+    def at_more(a):
+        return jnp.asarray(resample(np.asarray(a), FINER * a.shape[0], axis=0))
+
+    return InWake(jax.tree.map(at_more, z.wake), at_more(z.flap), at_more(z.lag), z.controls)
 
 
 _wake_velocity = eqx.filter_jit(wake_velocity)
