@@ -70,9 +70,9 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 
 
 KNOWN = (
-    "The tip vortex passes the following blade (age 180°) too high and too far inboard: lift is too large there, and "
-    "with it the thrust. The contraction goes on beyond what was measured. Two inboard filaments, at 0.35 and 0.75 R "
-    'with `roll_up="maximum"`, bring C_T to 2.5 to 4 % above the measurement (inboard cores of 0.12 and 0.07 R), but '
-    "with them the UH-60 does not converge at h = 1 and below, so they are not the default."
+    "The tip vortex passes the following blade (age 180°) somewhat too high and too far inboard: lift is too large "
+    "there. The contraction goes on beyond what was measured, as it does in Landgrebe's fit, which ours agrees with. At "
+    "r = 0.5 lift is too small because the inboard filaments fade with age: at half that rate it is 5 % low, and the "
+    "UH-60's wake is lost at h = 0.5."
 )
 CASE = ValidationCase(NAME, "Caradonna and Tung's rotor at 8°", points, compare, KNOWN)

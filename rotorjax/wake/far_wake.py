@@ -9,6 +9,9 @@ from rotorjax.ground import Plane
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.vortex_core import core_radius
 
+STILL = 0.01
+"""Wind over ΩR below which the closure over ground is that of hover."""
+
 
 def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]) -> Float[Array, "F C 3"]:
     """Nodes of the turns that follow the free ones: the last free turn, repeated under the flow in which it ends.
@@ -21,7 +24,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     turn = model.settings.steps_per_turn
     last, before = nodes[:, -turn:], nodes[:, -2 * turn : -turn]
     repeats = range(1, model.settings.closure_turns + 1)
-    drift = jnp.zeros(3, nodes.dtype)
+    drift = along = jnp.zeros(3, nodes.dtype)
     if model.flight is not None:
         along = model.flight.wind.at[2].set(0.0)
         drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
@@ -38,9 +41,10 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     ratio = (mean / mean_before)[:, None, None]
     flat = last - height[..., None] * normal - foot
     if model.flight is not None:
-        # in a wind the stagnation point goes with the turn
+        # in a wind the stagnation point goes with the turn; in none it stays on the shaft, as in hover
         drift = drift - (drift @ normal) * normal
-        foot = foot + jnp.mean(flat, axis=1, keepdims=True)
+        share = (along @ along) / (along @ along + STILL**2)
+        foot = foot + share * jnp.mean(flat, axis=1, keepdims=True)
         flat = last - height[..., None] * normal - foot
     return jnp.concatenate(
         [foot + k * drift + flat * ratio ** (-0.5 * k) + height[..., None] * ratio**k * normal for k in repeats],

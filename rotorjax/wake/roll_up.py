@@ -11,11 +11,12 @@ maximum".
 
 A pair of filaments ±Γ_tip cannot carry the thrust of an arbitrary loading if Γ_tip is its maximum: the impulse of the
 wake, ρΣγ r²/2 per radian, would differ from what the blade put in, by 20 % for the peaked loading of a UH-60, and the
-inflow with it. The default "impulse" rule asks for the strength that keeps it,
+inflow with it. The default "impulse" rule hands every trailer to the two filaments it lies between, or the two nearest
+at the ends, by weights linear in r², so that for any loading both
 
-    Γ_tip (r_tip² − r_in²) = Σ_i γ_i r_i² = 2 ∫ Γ r dr,
+    Σ_f Γ_f = Σ_i γ_i = 0   and   Σ_f Γ_f r_f² = Σ_i γ_i r_i² = 2 ∫ Γ r dr
 
-which is linear in Γ: as smooth as a rule can be.
+hold. It is linear in Γ: as smooth as a rule can be.
 """
 
 from typing import NamedTuple
@@ -55,10 +56,10 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
     """Start points and strengths of the far filaments from the last row of the near wake and its ring strengths."""
     settings, inboard = model.settings, model.settings.inboard
     if settings.roll_up == "impulse":
-        strength = trailers(gamma) @ model.edges**2 / (settings.release**2 - inboard[0] ** 2)
-        stations = jnp.stack([settings.release, jnp.asarray(inboard[0])])
+        stations = jnp.stack([*(jnp.asarray(r) for r in inboard), settings.release])
+        strength = _hats(model.edges**2, stations**2) @ trailers(gamma)
         points = jnp.stack([at_span(model, last_row, r) for r in stations])
-        return Release(points, jnp.stack([strength, -strength]))
+        return Release(jnp.roll(points, 1, axis=0), jnp.roll(strength, 1))
     gathered = tip_share(model, gamma) * trailers(gamma)
     strength = jnp.sum(gathered)
     if model.settings.roll_up == "paper":
@@ -78,6 +79,20 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
 def at_span(model: FreeWake, row: Float[Array, "R+1 3"], r: Float[Array, ""]) -> Float[Array, "3"]:
     """Point of a row of nodes at span station r (over R), linear between trailers."""
     return jnp.stack([jnp.interp(r, model.edges, row[:, i]) for i in range(3)])
+
+
+def _hats(x: Float[Array, " N"], nodes: Float[Array, " G"]) -> Float[Array, "G N"]:
+    """Linear weights of x over its two neighbouring nodes, the outermost pair's carried on beyond the ends.
+
+    They reproduce 1 and x: what is handed out keeps its sum and its first moment.
+    """
+    left = jnp.clip(jnp.searchsorted(nodes, x, side="right") - 1, 0, len(nodes) - 2)
+    share = (x - nodes[left]) / (nodes[left + 1] - nodes[left])
+    return (
+        jnp.zeros((len(nodes), len(x)), x.dtype)
+        .at[left, jnp.arange(len(x))].set(1 - share)
+        .at[left + 1, jnp.arange(len(x))].set(share)
+    )
 
 
 def _shares(model: FreeWake, stations: tuple[float, ...]) -> Float[Array, "G R+1"]:

@@ -24,7 +24,7 @@ class WakeSettings(eqx.Module):
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
         roll_up: strength of the tip vortex and where it leaves the last row of the near wake (roll_up.py).
-            "impulse": at `release`, as strong as conserves circulation and impulse with a single inboard filament;
+            "impulse": at `release`, trailers shared among all filaments so that circulation and impulse are kept;
             "maximum": at `release`, the smooth maximum of the bound circulation; "centroid": that strength, at the
             circulation-weighted centroid of what it gathers; "paper": that strength, at the last outboard node
             (text below Eq. 13), to be used with `inboard=()`.
@@ -32,7 +32,8 @@ class WakeSettings(eqx.Module):
     Arrays (differentiable; lengths over R):
         release: span station of the tip vortex's release. sharpness: exponent of the smooth maximum that measures the
             tip vortex's strength (∞ is the paper's maximum, whose argmax has no derivative).
-        tip_core, turbulence: r₀ and a₁ of Eq. 16 (Bhagwat & Leishman 2002; a₁ between 5e-5 and 4e-4 is in use).
+        tip_core, turbulence: r₀ and a₁ of Eq. 16 (Bhagwat & Leishman 2002; a₁ between 5e-5 and 4e-4 is in use;
+            the upper end keeps old turns that lie close together above the ground from rolling around each other).
         inboard_core: least core of the inboard filaments, each the whole inner vortex sheet gathered into one line.
         near_core: core of the lattice in the velocity of wake nodes, about the distance a node travels over its
             neighbour's sheet; the blade's own control points see control_core instead, small against a panel, so
@@ -106,15 +107,15 @@ def wake_settings(
     panels: int = 14,
     age_step_deg: float = 15.0,
     near_wake_deg: float = 90.0,
-    free_turns: float = 4.0,
-    closure_turns: int = 4,
+    free_turns: float = 3.0,
+    closure_turns: int = 5,
     azimuths: int = 8,
-    inboard: tuple[float, ...] = (0.45,),
+    inboard: tuple[float, ...] = (0.45, 0.75),
     roll_up: RollUp = "impulse",
     release: float = 0.975,
     sharpness: float = 20.0,
     tip_core: float = 0.03,
-    turbulence: float = 2e-4,
+    turbulence: float = 4e-4,
     inboard_core: float = 0.12,
     near_core: float = 0.03,
     control_core: float = 0.002,
@@ -188,17 +189,19 @@ def _check_roll_up(settings: WakeSettings) -> None:
     inboard, roll_up = settings.inboard, settings.roll_up
     if roll_up not in get_args(RollUp):
         raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {roll_up!r}")
-    if roll_up == "impulse" and len(inboard) != 1:
+    if roll_up == "impulse" and (not inboard or inboard[-1] >= float(settings.release)):
         raise InputError(
-            f"Argument `inboard` must hold one station for roll_up 'impulse', but is {inboard}: "
-            "use 'maximum' or 'centroid'"
+            f"Argument `inboard` must hold stations inboard of `release` ({float(settings.release):g}) for roll_up "
+            f"'impulse', but is {inboard}: use 'paper', 'maximum' or 'centroid' for a tip vortex alone"
         )
     if any(not 0 < r < 1 for r in inboard) or list(inboard) != sorted(set(inboard)):
         raise InputError(f"Argument `inboard` must hold rising span stations between 0 and 1, but is {inboard}")
 
 
 def flight_settings(blades: int, **overrides) -> WakeSettings:
-    """Settings for a wake that the wind carries away: two free turns, at least twelve azimuths, cores of 0.05 R.
+    """Settings for a wake that the wind carries away: two free turns, twelve azimuths or more, cores of 0.05 R.
+
+    One inboard filament is enough: the wind carries the inner sheet away before it passes under the next blades.
 
     That core is the paper's. Tip vortices that pile up beside the disk roll around each other, and with the thin cores
     of hover their periodic path is hardly found; the measured inflow of Elliott and Althoff is met as well with 0.08 R.
@@ -206,7 +209,7 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
     near wake back across the blade.
     """
     azimuths = blades * -(-12 // blades)
-    usual = {"azimuths": azimuths, "free_turns": 2.0, "closure_turns": 2}
+    usual = {"azimuths": azimuths, "free_turns": 2.0, "closure_turns": 2, "inboard": (0.45,)}
     usual |= {"tip_core": 0.05, "near_core": 0.05, "control_core": 0.02}
     return wake_settings(**usual | overrides)
 

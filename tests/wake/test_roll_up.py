@@ -11,7 +11,7 @@ from rotorjax.wake.roll_up import release, tip_share, trailers
 from rotorjax.wake.settings import wake_settings
 
 RULES = {
-    "impulse": (0.45,),
+    "impulse": (0.45, 0.75),
     "maximum": (0.3, 0.6, 0.9),
     "centroid": (0.3, 0.6, 0.9),
 }
@@ -33,8 +33,9 @@ def test_far_filaments_carry_no_net_circulation(uh60, rule, inboard):
     assert abs(float(jnp.sum(found.strength))) < 1e-16
 
 
-def test_impulse_rule_keeps_the_impulse_of_the_trailers(uh60):
-    model = model_of(uh60, "impulse", (0.45,))
+@pytest.mark.parametrize("inboard", [(0.45,), (0.45, 0.75), (0.25, 0.5, 0.75)])
+def test_impulse_rule_keeps_the_impulse_of_the_trailers(uh60, inboard):
+    model = model_of(uh60, "impulse", inboard)
     gamma = loading(model)
     found = release(model, model.leading, gamma)
     np.testing.assert_allclose(
@@ -85,6 +86,7 @@ def test_unloaded_and_downward_blades_stay_finite(uh60, gamma):
     assert all(bool(jnp.all(jnp.isfinite(v))) for v in (*found, *slope))
 
 
-def test_impulse_rule_needs_one_inboard_filament():
+@pytest.mark.parametrize("inboard", [(), (0.3, 0.98)])
+def test_impulse_rule_needs_filaments_inboard_of_the_release(inboard):
     with pytest.raises(InputError, match="inboard"):
-        wake_settings(roll_up="impulse", inboard=(0.3, 0.6))
+        wake_settings(roll_up="impulse", inboard=inboard)
