@@ -115,7 +115,7 @@ def _free(subject: Subject) -> tuple[Point, ...]:
 
 KNOWN = (
     "From h = 1.5 up the inflow is larger than both formulas have it: this wake feels a distant ground too little. "
-    "The closure has a share in it, for it slows every turn by one ratio, as only the flow next to the ground does: with "
-    "two free turns in place of three C_T at h = 2 is 1.2 % lower still."
+    "The closure has a share in it, for it slows every turn by one ratio, as only the flow next to the ground does: "
+    "with two free turns in place of three C_T at h = 2 is 1.2 % lower still."
 )
 CASE = ValidationCase(NAME, "Level ground", points, compare, KNOWN)
