@@ -90,8 +90,10 @@ def _hats(x: Float[Array, " N"], nodes: Float[Array, " G"]) -> Float[Array, "G N
     share = (x - nodes[left]) / (nodes[left + 1] - nodes[left])
     return (
         jnp.zeros((len(nodes), len(x)), x.dtype)
-        .at[left, jnp.arange(len(x))].set(1 - share)
-        .at[left + 1, jnp.arange(len(x))].set(share)
+        .at[left, jnp.arange(len(x))]
+        .set(1 - share)
+        .at[left + 1, jnp.arange(len(x))]
+        .set(share)
     )
 
 
