@@ -215,5 +215,5 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
 
 
 def quick_settings(**overrides) -> WakeSettings:
-    """Coarser settings for a first look: fewer panels and turns."""
+    """Coarser settings for a first look: fewer panels, a shorter closure."""
     return wake_settings(**{"panels": 12, "free_turns": 3.0, "closure_turns": 3} | overrides)
