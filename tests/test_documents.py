@@ -62,6 +62,8 @@ def studied(clone):
 def test_the_main_command_works_from_a_fresh_clone(clone, studied):
     run, out = studied
     assert run.returncode == 0, run.stderr[-2000:]
+    # less inflow on the mountain side than on the valley side
+    assert re.search(r"^\| Slope \|.*\| holds \|", (out / "report.md").read_text(), re.MULTILINE)
     for name in ("report.md", "summary.json", "cases.nc", "fig06.png", "overview.png"):
         assert (out / name).exists()
     inflow = sh(INFLOW, clone)

@@ -35,7 +35,9 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     plane = model.ground
     # heights do not depend on the frame, so only the foot and the normal have to be turned into the blade's
     normal = rotate_about_shaft(plane.normal, -psi)
-    foot = jnp.stack([jnp.zeros_like(plane.height), jnp.zeros_like(plane.height), -plane.height])
+    # where the shaft meets the plane, which a hub that has turned sees elsewhere than under its height
+    zero = jnp.zeros_like(plane.height)
+    foot = jnp.stack([zero, zero, -plane.height * jnp.cos(plane.slope) / normal[2]])
     height = last @ normal + plane.height * jnp.cos(plane.slope)
     mean, mean_before = jnp.mean(height, axis=1), jnp.mean(_heights(before, normal, plane), axis=1)
     ratio = (mean / mean_before)[:, None, None]

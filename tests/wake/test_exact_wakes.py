@@ -61,6 +61,7 @@ def helical(uh60):
         turbulence=0.0,
         taper_turns=0.01,
         self_induction_core=0.01,
+        inboard=(0.45,),
     )
     model = free_wake(*uh60, None, settings)
     return eqx.tree_at(lambda m: m.operating.viscosity, model, jnp.asarray(1e-9))
