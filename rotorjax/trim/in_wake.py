@@ -23,13 +23,7 @@ from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.flap_lag import blade_of, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.trim.free_wake import (
-    InWake,
-    WakeTrim,
-    first_guess,
-    flown,
-    residual,
-)
+from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, residual
 from rotorjax.trim.problem import Aim
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings

@@ -72,7 +72,7 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 KNOWN = (
     "The tip vortex passes the following blade (age 180°) somewhat too high and too far inboard: lift is too large "
     "there. The contraction goes on beyond what was measured, as it does in Landgrebe's fit, which ours agrees with. "
-    "At r = 0.5 lift is too small because the inboard filaments fade with age: at half that rate it is 5 % low, and "
-    "the UH-60's wake is lost at h = 0.5."
+    "At r = 0.5 lift is too small because the inboard filaments fade with age: at half that rate it is 5 % low, but "
+    "the UH-60's wake was lost at h = 0.5 when that was tried (a₁ = 2e-4, release at 0.9625)."
 )
 CASE = ValidationCase(NAME, "Caradonna and Tung's rotor at 8°", points, compare, KNOWN)

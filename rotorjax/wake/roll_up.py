@@ -19,11 +19,10 @@ at the ends, by weights linear in r², so that for any loading both
 hold. It is linear in Γ: as smooth as a rule can be.
 """
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import jax.nn
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.model import FreeWake
@@ -57,7 +56,7 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
     settings, inboard = model.settings, model.settings.inboard
     if settings.roll_up == "impulse":
         stations = jnp.stack([*(jnp.asarray(r) for r in inboard), settings.release])
-        strength = _hats(model.edges**2, stations**2) @ trailers(gamma)
+        strength = _weights(model.edges**2, stations**2, "extrapolate") @ trailers(gamma)
         points = jnp.stack([at_span(model, last_row, r) for r in stations])
         return Release(jnp.roll(points, 1, axis=0), jnp.roll(strength, 1))
     gathered = tip_share(model, gamma) * trailers(gamma)
@@ -71,7 +70,7 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
         point = at_span(model, last_row, model.settings.release)
     if not inboard:
         return Release(point[None], strength[None])
-    rest = _shares(model, inboard) @ (trailers(gamma) - gathered)
+    rest = _weights(model.edges, jnp.asarray(inboard)) @ (trailers(gamma) - gathered)
     points = jnp.stack([at_span(model, last_row, jnp.asarray(r)) for r in inboard])
     return Release(jnp.concatenate([point[None], points]), jnp.concatenate([strength[None], rest]))
 
@@ -81,23 +80,11 @@ def at_span(model: FreeWake, row: Float[Array, "R+1 3"], r: Float[Array, ""]) ->
     return jnp.stack([jnp.interp(r, model.edges, row[:, i]) for i in range(3)])
 
 
-def _hats(x: Float[Array, " N"], nodes: Float[Array, " G"]) -> Float[Array, "G N"]:
-    """Linear weights of x over its two neighbouring nodes, the outermost pair's carried on beyond the ends.
+def _weights(
+    x: Float[Array, " N"], nodes: Float[Array, " G"], beyond: Literal["extrapolate"] | None = None
+) -> Float[Array, "G N"]:
+    """Linear weights that hand each x to its neighbouring nodes; they sum to one over the nodes.
 
-    They reproduce 1 and x: what is handed out keeps its sum and its first moment.
+    Beyond the ends all goes to the last node, or with "extrapolate" to the last two so that Σ weights · nodes is x.
     """
-    left = jnp.clip(jnp.searchsorted(nodes, x, side="right") - 1, 0, len(nodes) - 2)
-    share = (x - nodes[left]) / (nodes[left + 1] - nodes[left])
-    return (
-        jnp.zeros((len(nodes), len(x)), x.dtype)
-        .at[left, jnp.arange(len(x))]
-        .set(1 - share)
-        .at[left + 1, jnp.arange(len(x))]
-        .set(share)
-    )
-
-
-def _shares(model: FreeWake, stations: tuple[float, ...]) -> Float[Array, "G R+1"]:
-    """Linear weights that hand each trailer to its neighbouring stations; they sum to one over the stations."""
-    places = jnp.asarray(np.asarray(stations))
-    return jnp.stack([jnp.interp(model.edges, places, unit) for unit in jnp.eye(len(stations))])
+    return jnp.stack([jnp.interp(x, nodes, unit, left=beyond, right=beyond) for unit in jnp.eye(len(nodes))])

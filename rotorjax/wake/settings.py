@@ -191,8 +191,8 @@ def _check_roll_up(settings: WakeSettings) -> None:
         raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {roll_up!r}")
     if roll_up == "impulse" and (not inboard or inboard[-1] >= float(settings.release)):
         raise InputError(
-            f"Argument `inboard` must hold stations inboard of `release` ({float(settings.release):g}) for roll_up "
-            f"'impulse', but is {inboard}: use 'paper', 'maximum' or 'centroid' for a tip vortex alone"
+            f"Argument `inboard` must hold stations below `release` ({float(settings.release):g}) for roll_up "
+            f"'impulse', but is {inboard}: move them inboard, or use 'paper' for a tip vortex alone"
         )
     if any(not 0 < r < 1 for r in inboard) or list(inboard) != sorted(set(inboard)):
         raise InputError(f"Argument `inboard` must hold rising span stations between 0 and 1, but is {inboard}")
@@ -201,7 +201,7 @@ def _check_roll_up(settings: WakeSettings) -> None:
 def flight_settings(blades: int, **overrides) -> WakeSettings:
     """Settings for a wake that the wind carries away: two free turns, twelve azimuths or more, cores of 0.05 R.
 
-    One inboard filament is enough: the wind carries the inner sheet away before it passes under the next blades.
+    One inboard filament, with which the inflow of Elliott and Althoff's rotor was met; two have not been tried here.
 
     That core is the paper's. Tip vortices that pile up beside the disk roll around each other, and with the thin cores
     of hover their periodic path is hardly found; the measured inflow of Elliott and Althoff is met as well with 0.08 R.
