@@ -207,7 +207,8 @@ def _nothing() -> Figure:
 
 
 KNOWN = (
-    "The printed factor gives ground at rest two to three times the free wake's gain. If the ground comes up at "
+    "The printed factor gives ground at rest two to three times the free wake's gain. (The numbers that follow were "
+    "measured with one inboard filament.) If the ground comes up at "
     "once and stays (h = 1), the free wake feels 0.066 ΩR over R before it moves and the finite states 0.039; it "
     "then spreads and takes all of that back within a revolution, while their cylinder keeps 0.029. Slow heave thus "
     "has less of the ground's share, which is in phase, and lags more. Fast heave is climb. The free wake's inflow "
