@@ -6,7 +6,7 @@ import numpy as np
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.solution import Solution
 
-COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 2.0, "closure_turns": 3}
+COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "closure_turns": 1, "closure_bundles": 2}
 """Settings that the tests and a notebook share, so that their programs are compiled once."""
 
 STATE_SHAPES = {"near": (15, 2, 3), "far": (2, 8, 3), "gamma_near": (14, 2), "gamma_far": (2, 8), "gamma_bound": (14,)}

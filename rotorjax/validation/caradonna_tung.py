@@ -70,9 +70,8 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 
 
 KNOWN = (
-    "The tip vortex passes the following blade (age 180°) somewhat too high and too far inboard: lift is too large "
-    "there. The contraction goes on beyond what was measured, as it does in Landgrebe's fit, which ours agrees with. "
-    "At r = 0.5 lift is too small because the inboard filaments fade with age: at half that rate it is 5 % low, but "
-    "the UH-60's wake was lost at h = 0.5 when that was tried (a₁ = 2e-4, release at 0.9625)."
+    "The contraction goes on beyond what was measured, as it does in Landgrebe's fit, which ours agrees with. "
+    "At r = 0.5 lift is too small because the inboard filaments fade with age: at 0.4 a turn in place of 0.5 it is "
+    "inside, but then the ground has too much effect at h = 0.75 and 1."
 )
 CASE = ValidationCase(NAME, "Caradonna and Tung's rotor at 8°", points, compare, KNOWN)

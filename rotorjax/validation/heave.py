@@ -26,8 +26,9 @@ STEADY, EARLY = (0.1, 0.2), (0.5, 1.0)
 FREQUENCIES = np.geomspace(0.02, 2.0, 49)
 DOUBTFUL = 0.3
 """Frequency over Ω from which unstable modes colour the free wake's transfer function."""
-SIZE, MARCHED = 0.002, 0.5
-"""ε over R and frequency over Ω of the heave that is marched."""
+SIZE, MARCHED = 2e-4, 0.5
+"""ε over R and frequency over Ω of the heave that is marched. At h = 1 C_T rises steeply: the march of 0.002 R is off
+its linear model by 13 %, of 5e-4 R by 4 %, of 1e-4 R by 1 %."""
 OTHER = 1 - reference.OTHER_MASS / reference.MASS
 LAG_DEG = float(np.rad2deg(np.arctan((1 - OTHER) ** -0.5) - np.arctan((1 - OTHER) ** 0.5)))
 """The most that the phase of a first-order lag changes where its mass is less by OTHER."""

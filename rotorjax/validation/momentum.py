@@ -98,8 +98,7 @@ def draw(found: Mapping[Point, Ratios]) -> Figure:
 KNOWN = (
     "The mean at the blades, which every other number of this package means by mean inflow, is out where blades are "
     "few or the thrust is large. Between the blades the inflow is smaller; its mean over the disk, which momentum "
-    "theory speaks of, is in range but for the strongly twisted UH-60 at light load, where induced power falls 1 % "
-    "below the ideal too: which of the wake's simplifications does it is not known (fading inboard filaments do not, "
-    "without it is 0.95). Induced power is too large for two untwisted blades."
+    "theory speaks of, is in range. Induced power is too large for two untwisted blades: without fading inboard "
+    "filaments κ is 0.06 lower, with thrust 5 % higher."
 )
 CASE = ValidationCase(NAME, "Momentum theory", points, compare, KNOWN)

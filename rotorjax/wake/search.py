@@ -108,7 +108,7 @@ class Search:
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
         linear = Krylov(forcing=0.03, precondition=self.inverse, restart=effort, restarts=1)
-        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=10 if effort > 1 else 1)
+        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=16 if effort > 1 else 1)
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""

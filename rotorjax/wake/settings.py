@@ -1,6 +1,6 @@
 """How a free wake is discretised and closed: one frozen object, each choice with its reason."""
 
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -19,7 +19,8 @@ class WakeSettings(eqx.Module):
     Static (they fix array shapes):
         panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip.
         age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
-            are free to move; closure_turns: further turns that repeat the last free one (far_wake.py).
+            are free to move; closure_turns: further turns that repeat the last free one, one by one;
+            closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py).
         azimuths: K, slices of the periodic wake where it is not axisymmetric (a multiple of the number of blades).
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
@@ -30,8 +31,10 @@ class WakeSettings(eqx.Module):
             (text below Eq. 13), to be used with `inboard=()`.
 
     Arrays (differentiable; lengths over R):
-        release: span station of the tip vortex's release. sharpness: exponent of the smooth maximum that measures the
-            tip vortex's strength (∞ is the paper's maximum, whose argmax has no derivative).
+        release: span station of the tip vortex's release, near the centroid of what it gathers, which is at 0.98 for
+            Caradonna and Tung's rotor (Betz); chosen a little inboard of it by their measured path, for the last row
+            has begun to roll up and its outer nodes lie high. sharpness: exponent of the smooth maximum that measures
+            the tip vortex's strength (∞ is the paper's maximum, whose argmax has no derivative).
         tip_core, turbulence: r₀ and a₁ of Eq. 16 (Bhagwat & Leishman 2002; a₁ between 5e-5 and 4e-4 is in use;
             the upper end keeps old turns that lie close together above the ground from rolling around each other).
         inboard_core: least core of the inboard filaments, each the whole inner vortex sheet gathered into one line.
@@ -47,7 +50,6 @@ class WakeSettings(eqx.Module):
             lose (field.py).
         inboard_decay: rate per turn at which the inboard filaments lose strength: vorticity of both signs that lies
             side by side in the inner sheet diffuses and cancels, the tip vortex's does not.
-        taper_turns: turns over which all strengths fade at the very end, so that the cut end induces nothing abrupt.
         stall_chords: standard deviation, in chords, of the mean along the span with which the aerofoil's polar is
             entered (blade_element.span_averages); without it the root of a rotor near the ground has several stalled
             states and, between them, none.
@@ -59,6 +61,7 @@ class WakeSettings(eqx.Module):
     near_wake_deg: float = eqx.field(static=True)
     free_turns: float = eqx.field(static=True)
     closure_turns: int = eqx.field(static=True)
+    closure_bundles: int = eqx.field(static=True)
     azimuths: int = eqx.field(static=True)
     inboard: tuple[float, ...] = eqx.field(static=True)
     roll_up: RollUp = eqx.field(static=True)
@@ -73,7 +76,6 @@ class WakeSettings(eqx.Module):
     bound_core_chords: Float[Array, ""]
     self_induction_core: Float[Array, ""]
     inboard_decay: Float[Array, ""]
-    taper_turns: Float[Array, ""]
     stall_chords: Float[Array, ""]
     circulation_lag: Float[Array, ""]
 
@@ -107,23 +109,23 @@ def wake_settings(
     panels: int = 14,
     age_step_deg: float = 15.0,
     near_wake_deg: float = 90.0,
-    free_turns: float = 3.0,
-    closure_turns: int = 5,
+    free_turns: float = 2.0,
+    closure_turns: int = 2,
+    closure_bundles: int = 5,
     azimuths: int = 8,
     inboard: tuple[float, ...] = (0.45, 0.75),
     roll_up: RollUp = "impulse",
-    release: float = 0.975,
+    release: float = 0.971,
     sharpness: float = 20.0,
-    tip_core: float = 0.03,
+    tip_core: float = 0.025,
     turbulence: float = 4e-4,
     inboard_core: float = 0.12,
     near_core: float = 0.03,
     control_core: float = 0.002,
     control_chords: float = 0.5,
     bound_core_chords: float = 0.55,
-    self_induction_core: float = 0.01,
-    inboard_decay: float = 0.6,
-    taper_turns: float = 1.5,
+    self_induction_core: float = 0.008,
+    inboard_decay: float = 0.5,
     stall_chords: float = 0.5,
     circulation_lag: float = 0.1,
 ) -> WakeSettings:
@@ -132,13 +134,14 @@ def wake_settings(
     Raises InputError where a count, an angle or a length is out of range.
     """
     numbers = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, control_chords)
-    numbers += (bound_core_chords, self_induction_core, inboard_decay, taper_turns, stall_chords, circulation_lag)
+    numbers += (bound_core_chords, self_induction_core, inboard_decay, stall_chords, circulation_lag)
     settings = WakeSettings(
         panels,
         age_step_deg,
         near_wake_deg,
         free_turns,
         closure_turns,
+        closure_bundles,
         azimuths,
         tuple(inboard),
         roll_up,
@@ -154,13 +157,13 @@ def wake_settings(
     return settings
 
 
-_POSITIVE = ("sharpness", "tip_core", "inboard_core", "near_core", "control_core", "bound_core_chords", "taper_turns")
+_POSITIVE = ("sharpness", "tip_core", "inboard_core", "near_core", "control_core", "bound_core_chords")
 _POSITIVE += ("self_induction_core", "circulation_lag", "stall_chords")
 
 
 def _check_counts(settings: WakeSettings) -> None:
     """Raise InputError where a number of panels, ages or turns does not work out."""
-    for name, least in (("panels", 4), ("closure_turns", 0), ("azimuths", 1)):
+    for name, least in (("panels", 4), ("closure_turns", 0), ("closure_bundles", 0), ("azimuths", 1)):
         value = getattr(settings, name)
         if value < least or value != int(value):
             raise InputError(f"Argument `{name}` must be a whole number of at least {least}, but is {value}")
@@ -199,7 +202,7 @@ def _check_roll_up(settings: WakeSettings) -> None:
 
 
 def flight_settings(blades: int, **overrides) -> WakeSettings:
-    """Settings for a wake that the wind carries away: two free turns, twelve azimuths or more, cores of 0.05 R.
+    """Settings for a wake that the wind carries away: twelve azimuths or more, a short closure, cores of 0.05 R.
 
     One inboard filament, with which the inflow of Elliott and Althoff's rotor was met; two have not been tried here.
 
@@ -209,11 +212,12 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
     near wake back across the blade.
     """
     azimuths = blades * -(-12 // blades)
-    usual = {"azimuths": azimuths, "free_turns": 2.0, "closure_turns": 2, "inboard": (0.45,)}
+    usual = {"azimuths": azimuths, "closure_turns": 1, "closure_bundles": 2, "inboard": (0.45,)}
     usual |= {"tip_core": 0.05, "near_core": 0.05, "control_core": 0.02}
     return wake_settings(**usual | overrides)
 
 
 def quick_settings(**overrides) -> WakeSettings:
     """Coarser settings for a first look: fewer panels, a shorter closure."""
-    return wake_settings(**{"panels": 12, "free_turns": 3.0, "closure_turns": 3} | overrides)
+    usual: dict[str, Any] = {"panels": 12, "closure_turns": 1, "closure_bundles": 4}
+    return wake_settings(**usual | overrides)

@@ -36,7 +36,8 @@ OVER_GROUND = FLIGHT + "height = 1.0\n"
 TIME = "[time]\nduration = 0.3\n"
 HISTORY = "[history]\nt = [0.0, 0.3]\n"
 MOTION = "w = [9.0, 9.0]\np_deg = [8.0, 8.0]\n"
-WAKE = "[wake]\npanels = 5\nage_step_deg = 30.0\nnear_wake_deg = 120.0\nclosure_turns = 1\nturbulence = 0.0\n"
+WAKE = "[wake]\npanels = 5\nage_step_deg = 30.0\nnear_wake_deg = 120.0\n"
+WAKE += "closure_turns = 1\nclosure_bundles = 0\nturbulence = 0.0\n"
 
 
 def write(folder, *parts):

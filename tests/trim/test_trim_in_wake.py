@@ -24,7 +24,7 @@ from rotorjax.trim.wake_means import evaluated, means
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 THRUST = 0.0058
-TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "free_turns": 2.0, "closure_turns": 1}
+TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "closure_turns": 1, "closure_bundles": 0}
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.solution import solve
 
-COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 2.0, "closure_turns": 3}
+COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "closure_turns": 1, "closure_bundles": 2}
 
 
 @pytest.fixture(scope="session")

@@ -50,16 +50,14 @@ def test_semi_infinite_helices_give_half_of_endless_ones(r, blades):
 
 @pytest.fixture(scope="module")
 def helical(uh60):
-    """A wake without ground whose settings have a fine age step, hardly a core, and many turns of closure."""
+    """A wake without ground whose settings have a fine age step, hardly a core, and the default closure."""
     settings = wake_settings(
         panels=6,
         age_step_deg=5.0,
         near_wake_deg=20.0,
         free_turns=2.0,
-        closure_turns=40,
         tip_core=1e-4,
         turbulence=0.0,
-        taper_turns=0.01,
         self_induction_core=0.01,
         inboard=(0.45,),
     )

@@ -15,7 +15,8 @@ from rotorjax.wake.settings import flight_settings
 from rotorjax.wake.start import prescribed
 
 SLICES = 8
-TINY = {"panels": 5, "age_step_deg": 30.0, "near_wake_deg": 120.0, "closure_turns": 1, "azimuths": SLICES}
+TINY = {"panels": 5, "age_step_deg": 30.0, "near_wake_deg": 120.0, "azimuths": SLICES}
+TINY |= {"closure_turns": 1, "closure_bundles": 0}
 
 
 @pytest.fixture(scope="module")

@@ -45,7 +45,7 @@ def test_pair_derivatives_are_those_of_the_kernel():
 def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, ground):
     """Any axisymmetric wake will do, solved or not: the identity is algebra."""
     settings = wake_settings(
-        panels=5, age_step_deg=30.0, near_wake_deg=120.0, free_turns=2.0, closure_turns=1, azimuths=8
+        panels=5, age_step_deg=30.0, near_wake_deg=120.0, closure_turns=1, closure_bundles=1, azimuths=8
     )
     model = free_wake(*uh60, ground, settings)
     x = prescribed(model)

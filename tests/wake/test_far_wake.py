@@ -1,0 +1,130 @@
+"""The turns that follow the free ones: as many as there are, over ground as in the free air far above it."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from rotorjax.ground import Plane
+from rotorjax.rotor.catalogue import load
+from rotorjax.wake.biot_savart import segment_velocity
+from rotorjax.wake.far_wake import REACH, closure, fading, repeats
+from rotorjax.wake.model import WakeState, free_wake
+from rotorjax.wake.roll_up import Release
+from rotorjax.wake.segments import far_filaments
+from rotorjax.wake.settings import wake_settings
+
+PITCH, RADIUS = 0.04, 0.75
+ZERO = jnp.zeros(())
+
+
+def model_of(height=None, **settings):
+    ground = None if height is None else Plane(jnp.asarray(height, float), jnp.zeros(()))
+    settings = wake_settings(panels=5, near_wake_deg=60.0, inboard_decay=0.0, turbulence=0.0, **settings)
+    return free_wake(*load("uh60"), ground, settings)
+
+
+def helices(model):
+    """Nodes of all filaments, the release point first, wound evenly down at PITCH a radian."""
+    settings = model.settings
+    age = settings.age_step * np.arange(settings.near_ages, settings.near_ages + settings.far_ages + 1)
+    one = np.stack([RADIUS * np.cos(age), -RADIUS * np.sin(age), -PITCH * age], axis=-1)
+    return jnp.asarray(np.stack([one] * settings.filaments))
+
+
+def inflow(model, points):
+    """Downward velocity of all blades' tip vortices with Γ = 1."""
+    nodes, settings = helices(model), model.settings
+    alone = jnp.zeros(settings.filaments).at[0].set(1.0)
+    nothing = jnp.zeros((settings.panels, settings.near_ages))
+    near = jnp.zeros((settings.panels + 1, settings.near_ages, 3))
+    strength = jnp.broadcast_to(alone[:, None], (settings.filaments, settings.far_ages))
+    state = WakeState(near, nodes[:, 1:], nothing, strength, nothing[:, 0])
+    far = far_filaments(model, state, Release(nodes[:, 0], alone), ZERO)
+    return -segment_velocity(points, *far, plane=model.ground, blades=model.rotor.blades)[:, 2]
+
+
+DISK = jnp.array([[0.1, 0.0, 0.0], [0.3, 0.2, 0.0], [0.0, 0.6, 0.0], [0.9, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize("turns", [2, 4])
+def test_bundles_stand_for_all_turns_to_come(turns):
+    """Against 320 turns one by one, their end closed as a vortex cylinder seen from far away."""
+    whole = inflow(model_of(closure_turns=320, closure_bundles=0), DISK)
+    sheet = 4 / (2 * np.pi * PITCH)
+    depth = 2 * np.pi * PITCH * (322 + 1 / 6)
+    whole = whole + 0.25 * sheet * RADIUS**2 / depth**2
+    found = inflow(model_of(closure_turns=turns, closure_bundles=6), DISK)
+    np.testing.assert_allclose(found, whole, atol=5e-3 * float(whole[0]))
+    cut = inflow(model_of(closure_turns=turns, closure_bundles=0), DISK)
+    # what a cut wake lacks, about R²/4L² of the sheet's strength
+    assert float(jnp.max(whole - cut)) > 0.02 * float(whole[0])
+
+
+def test_every_turn_is_counted_once():
+    model = model_of(closure_turns=3, closure_bundles=4)
+    after, weight = repeats(model)
+    assert weight == (1, 1, 1, 2, 4, 8, 16)
+    ends = np.cumsum(weight)
+    assert after[:3] == (1.0, 2.0, 3.0)
+    # within the turns that it stands for, nearer to their start
+    assert np.all(after > ends - np.array(weight))
+    assert np.all(after <= ends - (np.array(weight) - 1) / 2)
+    per_turn = model.settings.steps_per_turn
+    assert float(jnp.sum(fading(model)[0])) == pytest.approx(per_turn * (model.settings.free_turns + ends[-1]))
+
+
+def test_far_above_a_plane_the_closure_is_that_of_free_air():
+    free = closure(model_of(), helices(model_of()), ZERO)
+    for height, allowed in ((1e2, 1e-12), (1e5, 1e-9)):
+        over = closure(model_of(height), helices(model_of()), ZERO)
+        np.testing.assert_allclose(over, free, atol=allowed)
+
+
+@pytest.mark.parametrize("height", [0.8, 1.5, 3.0])
+def test_over_a_plane_it_stays_above_and_spreads_as_the_flow_through_it_is_kept(height):
+    """r² tanh(z/REACH) is the stream function of what comes down at −tanh(z/REACH)."""
+    model = model_of(height)
+    nodes = closure(model, helices(model), ZERO)
+    z, r = nodes[..., 2] + height, jnp.hypot(nodes[..., 0], nodes[..., 1])
+    assert float(jnp.min(z)) > 0
+    per_turn = model.settings.steps_per_turn
+    last = helices(model)[:, -per_turn:]
+    start = RADIUS**2 * jnp.tanh((last[..., 2] + height) / REACH)
+    for turn in range(model.settings.closure_turns):
+        here = slice(turn * per_turn, (turn + 1) * per_turn)
+        np.testing.assert_allclose((r**2 * jnp.tanh(z / REACH))[:, here], start, rtol=1e-10)
+        assert jnp.all(z[:, here] < last[..., 2] + height)
+
+
+def test_next_to_a_plane_every_turn_comes_down_by_the_same_ratio():
+    """A stagnation flow: heights fall by one ratio, radii grow by the root of its inverse."""
+    model = model_of(0.56, free_turns=2.0, closure_turns=3, closure_bundles=0)
+    nodes = 0.02 * helices(model)  # a wake far smaller than REACH …
+    low = nodes.at[..., 2].add(-0.55)  # … right above the plane
+    turn = model.settings.steps_per_turn
+    found = closure(model, low, ZERO).reshape(model.settings.filaments, 3, turn, 3)
+    z = found[..., 2] + 0.56
+    ratio = z[:, 1:] / z[:, :-1]
+    np.testing.assert_allclose(ratio, jnp.broadcast_to(ratio[:1, :1, :1], ratio.shape), rtol=1e-4)
+    radius = jnp.hypot(found[..., 0], found[..., 1])
+    np.testing.assert_allclose((radius[:, 1:] / radius[:, :-1]) ** -2, ratio, rtol=1e-4)
+
+
+@pytest.mark.parametrize("below", [0.0, 0.05])
+def test_nodes_that_a_search_puts_on_or_under_the_plane_do_no_harm(below):
+    model = model_of(0.8)
+    nodes = helices(model)
+    nodes = nodes.at[:, -3, 2].set(-0.8 - below)
+
+    def total(height, nodes):
+        return jnp.sum(jnp.sin(closure(eqx.tree_at(lambda m: m.ground.height, model, height), nodes, ZERO)))
+
+    height = jnp.asarray(0.8)
+    value, (by_height, by_nodes) = jax.jit(jax.value_and_grad(total, argnums=(0, 1)))(height, nodes)
+    assert np.isfinite(value)
+    assert np.isfinite(by_height)
+    assert np.all(np.isfinite(by_nodes))
+    forward = jax.jvp(total, (height, nodes), (jnp.ones(()), jnp.zeros_like(nodes)))[1]
+    np.testing.assert_allclose(forward, by_height, rtol=1e-10)
