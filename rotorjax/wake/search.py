@@ -70,7 +70,7 @@ class Search:
 
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
         first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
-        return self.follow(between, x, stage, first, last if tilt else SMALLEST)
+        return self.follow(between, x, stage, first, min(last, SMALLEST))
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
