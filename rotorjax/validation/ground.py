@@ -29,7 +29,7 @@ SOLID = Against("the ground is solid", "none: a sign", "no node may pass through
 ALONG = Against(
     "the flow along the ground", "none: a direction", "the wake contracts first, then runs out beyond the disk"
 )
-OUTSIDE = between(1.05, np.inf)
+OUTSIDE = between(1.0, np.inf)
 
 
 def points(subject: Subject) -> tuple[Point, ...]:
@@ -70,9 +70,10 @@ def _ratio_row(at: Point, near: Solution, alone: Solution) -> Row:
 
 
 def _spread(at: Point, solution: Solution) -> Row:
-    radius = tip_path(solution).r
-    name = f"radius of the tip vortex at its last free node over its least, h = {_height(at):g}"
-    return Row(NAME, name, float(radius[-1] / radius.min()), OUTSIDE, ALONG)
+    ours = float(tip_path(solution).r[-1])
+    return Row(
+        NAME, f"radius over R of the tip vortex at its last free node, h = {_height(at):g}", ours, OUTSIDE, ALONG
+    )
 
 
 def _height(at: Point) -> float:
@@ -112,4 +113,8 @@ def _free(subject: Subject) -> tuple[Point, ...]:
     return subject.hovers(point("caradonna_tung", 8.0) if subject.quick else point("uh60"))
 
 
-CASE = ValidationCase(NAME, "Level ground", points, compare)
+KNOWN = (
+    "At h = 1 the tip vortex has contracted and runs out again, but its two free turns end before it has passed the "
+    "rim; the turns that repeat the last one go on from there."
+)
+CASE = ValidationCase(NAME, "Level ground", points, compare, KNOWN)

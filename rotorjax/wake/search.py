@@ -22,10 +22,10 @@ from rotorjax.wake.start import laid_level, prescribed, with_the_ground
 Progress = Callable[[str, float], None]
 
 STEEPER, GENTLER = np.deg2rad(7.5), np.deg2rad(1.0)
-"""Most that the ground tilts in the first step of a continuation, and the least step that is still tried."""
+"""Most that the ground tilts in the first step of a continuation, and a step that is tried however far it goes."""
 
 SMALLEST = 0.05
-"""Least step of other continuations, over the whole way."""
+"""Least step of a continuation over the whole way; less on a long way to a steep ground (GENTLER)."""
 
 WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
