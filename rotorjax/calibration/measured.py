@@ -20,7 +20,7 @@ from rotorjax.validation import reference
 from rotorjax.wake.equilibrium import Unknowns, evaluate, residual
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.performance import performance
-from rotorjax.wake.roll_up import at_span
+from rotorjax.wake.roll_up import tip_point
 from rotorjax.wake.segments import lattice_nodes
 from rotorjax.wake.settings import wake_settings
 
@@ -87,7 +87,7 @@ def outputs(model: FreeWake, x: Unknowns) -> Float[Array, " N"]:
     found = evaluate(model, x)
     lift = jnp.interp(jnp.asarray(reference.caradonna_tung().r), model.stations, found.loads.cl[0])
     lattice = lattice_nodes(model, x.near[0])
-    inside = jax.vmap(lambda row: at_span(model, row, model.settings.release), in_axes=1)(lattice)
+    inside = jax.vmap(lambda row: tip_point(model, row), in_axes=1)(lattice)
     path = jnp.concatenate([inside, x.far[0, 0]])
     ages = model.settings.age_step * jnp.arange(len(path))
     r, z = (jnp.interp(jnp.deg2rad(jnp.asarray(AGES_DEG)), ages, v) for v in (_radius(path), path[:, 2]))

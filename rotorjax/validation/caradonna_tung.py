@@ -7,6 +7,7 @@ from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
 from rotorjax.validation import reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import section_lift, tip_path
+from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.row import Against, Row, absolute, relative
 
@@ -15,6 +16,11 @@ AGES_DEG = (60, 120, 180, 240, 300, 360)
 AT = point("caradonna_tung", 8.0)
 UNSTATED = "not in the data used"
 PATH = "±0.003 from reading the figure; the scatter about the authors' curve is not in the data used"
+POWER = Against(
+    "the measured lift, by the blade's own sections (measured_power.py)",
+    "±0.05 for ±3 % of the measured lift",
+    "that uncertainty",
+)
 AIM = "the aim set for this wake; no setting is tuned for a rotor"
 
 
@@ -29,12 +35,18 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
 
 
 def rows(subject: Subject, wakes: Wakes) -> list[Row]:
-    """C_T within 3 %, lift within 8 %, tip vortex within 0.02 R in radius and 0.03 R in height up to 360°."""
+    """C_T within 3 %, lift within 8 %, tip vortex within 0.02 R in radius and 0.03 R in height up to 360°.
+
+    And the induced power that goes with the measured lift: what momentum theory's limits are to be read against.
+    """
     solution, measured = wakes[AT], reference.caradonna_tung()
     loads, path_read = Against(SOURCE, UNSTATED, AIM), Against(SOURCE, PATH, AIM)
     found = [Row(NAME, "C_T", solution.CT, relative(0.03, measured.thrust), loads)]
     for r, ours, lift in zip(measured.r, section_lift(solution, measured.r), measured.lift, strict=True):
         found.append(Row(NAME, f"c_l at r/R = {r:.2f}", float(ours), relative(0.08, float(lift)), loads))
+    factor = reference.induced_power_factor(solution.CT, solution.CP_induced)
+    asked = measured_power_factor(solution.model.rotor, solution.model.operating, measured)
+    found.append(Row(NAME, "induced power factor", factor, absolute(0.05, asked), POWER))
     path, wanted = tip_path(solution), reference.caradonna_tung_path()
     for part, margin in (("r", 0.02), ("z", 0.03)):
         for age in AGES_DEG:
@@ -70,7 +82,9 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 
 
 KNOWN = (
-    "The contraction goes on beyond what was measured, as it does in Landgrebe's fit, which ours agrees with. "
+    "The tip vortex contracts more than was measured, as it does in Landgrebe's fit to other rotors, which ours agrees "
+    "with: at 360° the two measurements are 0.054 R apart. No setting tried takes more than 0.012 R of it away "
+    "(cores, fading, filaments, panels, near wake; a draught through the rotor of 1 m/s takes 0.007 R). "
     "At r = 0.5 lift is too small because the inboard filaments fade with age: at 0.4 a turn in place of 0.5 it is "
     "inside, but then the ground has too much effect at h = 0.75 and 1."
 )

@@ -9,7 +9,7 @@ from rotorjax.frames import disk_points
 from rotorjax.validation.reference import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
-from rotorjax.wake.roll_up import at_span
+from rotorjax.wake.roll_up import tip_point
 from rotorjax.wake.segments import lattice_nodes
 from rotorjax.wake.solution import Solution
 
@@ -21,7 +21,7 @@ def tip_path(solution: Solution) -> Path:
     """
     settings, state = solution.model.settings, solution.state
     lattice = np.asarray(lattice_nodes(solution.model, state.near[0]))
-    rows = [at_span(solution.model, jnp.asarray(lattice[:, k]), settings.release) for k in range(lattice.shape[1])]
+    rows = [tip_point(solution.model, jnp.asarray(lattice[:, k])) for k in range(lattice.shape[1])]
     nodes = np.concatenate([np.asarray(rows), np.asarray(state.far[0, 0])])
     return Path(settings.age_step * np.arange(len(nodes)), np.hypot(nodes[:, 0], nodes[:, 1]), nodes[:, 2])
 

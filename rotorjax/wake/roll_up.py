@@ -17,15 +17,22 @@ at the ends, by weights linear in r², so that for any loading both
     Σ_f Γ_f = Σ_i γ_i = 0   and   Σ_f Γ_f r_f² = Σ_i γ_i r_i² = 2 ∫ Γ r dr
 
 hold. It is linear in Γ: as smooth as a rule can be.
+
+The tip vortex starts at the mean place of a short stretch of the last row, `release` ± `release_band`. A single point
+of that row will not do: its edge has begun to roll up, and the point moves on with every panel that resolves it.
 """
 
 from typing import Literal, NamedTuple
 
-import jax.nn
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.model import FreeWake
+
+SAMPLES = 16
+"""Stations over which the place of the tip vortex is averaged."""
 
 
 class Release(NamedTuple):
@@ -57,7 +64,7 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
     if settings.roll_up == "impulse":
         stations = jnp.stack([*(jnp.asarray(r) for r in inboard), settings.release])
         strength = _weights(model.edges**2, stations**2, "extrapolate") @ trailers(gamma)
-        points = jnp.stack([at_span(model, last_row, r) for r in stations])
+        points = jnp.stack([*(at_span(model, last_row, r) for r in stations[:-1]), tip_point(model, last_row)])
         return Release(jnp.roll(points, 1, axis=0), jnp.roll(strength, 1))
     gathered = tip_share(model, gamma) * trailers(gamma)
     strength = jnp.sum(gathered)
@@ -67,12 +74,19 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
         # Γ_tip > 0 wherever the blade lifts; the floor keeps an unloaded blade finite
         point = (gathered @ last_row) / jnp.sqrt(strength**2 + 1e-16)
     else:
-        point = at_span(model, last_row, model.settings.release)
+        point = tip_point(model, last_row)
     if not inboard:
         return Release(point[None], strength[None])
     rest = _weights(model.edges, jnp.asarray(inboard)) @ (trailers(gamma) - gathered)
     points = jnp.stack([at_span(model, last_row, jnp.asarray(r)) for r in inboard])
     return Release(jnp.concatenate([point[None], points]), jnp.concatenate([strength[None], rest]))
+
+
+def tip_point(model: FreeWake, row: Float[Array, "R+1 3"]) -> Float[Array, "3"]:
+    """Mean of a row of nodes over the span stations `release` ± `release_band`: where the rows roll up to."""
+    across = (np.arange(SAMPLES) + 0.5) / SAMPLES * 2 - 1
+    places = jax.vmap(lambda r: at_span(model, row, r))
+    return jnp.mean(places(model.settings.release + model.settings.release_band * across), axis=0)
 
 
 def at_span(model: FreeWake, row: Float[Array, "R+1 3"], r: Float[Array, ""]) -> Float[Array, "3"]:

@@ -33,8 +33,10 @@ class WakeSettings(eqx.Module):
     Arrays (differentiable; lengths over R):
         release: span station of the tip vortex's release, near the centroid of what it gathers, which is at 0.98 for
             Caradonna and Tung's rotor (Betz); chosen a little inboard of it by their measured path, for the last row
-            has begun to roll up and its outer nodes lie high. sharpness: exponent of the smooth maximum that measures
-            the tip vortex's strength (∞ is the paper's maximum, whose argmax has no derivative).
+            has begun to roll up and its outer nodes lie high. release_band: half the width of the stretch about it
+            whose mean place that is, about the outer panels' width: with the point itself C_T does not settle as
+            panels are added. sharpness: exponent of the smooth maximum that measures the tip vortex's strength (∞ is
+            the paper's maximum, whose argmax has no derivative).
         tip_core, turbulence: r₀ and a₁ of Eq. 16 (Bhagwat & Leishman 2002; a₁ between 5e-5 and 4e-4 is in use;
             the upper end keeps old turns that lie close together above the ground from rolling around each other).
         inboard_core: least core of the inboard filaments, each the whole inner vortex sheet gathered into one line.
@@ -66,6 +68,7 @@ class WakeSettings(eqx.Module):
     inboard: tuple[float, ...] = eqx.field(static=True)
     roll_up: RollUp = eqx.field(static=True)
     release: Float[Array, ""]
+    release_band: Float[Array, ""]
     sharpness: Float[Array, ""]
     tip_core: Float[Array, ""]
     turbulence: Float[Array, ""]
@@ -116,6 +119,7 @@ def wake_settings(
     inboard: tuple[float, ...] = (0.45, 0.75),
     roll_up: RollUp = "impulse",
     release: float = 0.971,
+    release_band: float = 0.015,
     sharpness: float = 20.0,
     tip_core: float = 0.025,
     turbulence: float = 4e-4,
@@ -133,8 +137,8 @@ def wake_settings(
 
     Raises InputError where a count, an angle or a length is out of range.
     """
-    numbers = (release, sharpness, tip_core, turbulence, inboard_core, near_core, control_core, control_chords)
-    numbers += (bound_core_chords, self_induction_core, inboard_decay, stall_chords, circulation_lag)
+    numbers = (release, release_band, sharpness, tip_core, turbulence, inboard_core, near_core, control_core)
+    numbers += (control_chords, bound_core_chords, self_induction_core, inboard_decay, stall_chords, circulation_lag)
     settings = WakeSettings(
         panels,
         age_step_deg,
@@ -150,6 +154,7 @@ def wake_settings(
     _check_counts(settings)
     _check_roll_up(settings)
     check_number("release", release, 0.0, 1.0)
+    check_number("release_band", release_band, 0.0, 0.1)
     for name in _POSITIVE:
         check_number(name, float(getattr(settings, name)), 0.0, open_=True)
     for name in ("turbulence", "inboard_decay", "control_chords"):

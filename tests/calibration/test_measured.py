@@ -30,6 +30,7 @@ def test_the_wakes_numbers_are_the_validations_and_their_slopes_those_of_solved_
     wake = _Wake(model, data, names, data.rows(("CT", "z")))
     assert wake.residual(values).shape == (7,)
     rows = caradonna_tung.rows(Subject(), {caradonna_tung.AT: wake.solution})
+    rows = [row for row in rows if row.quantity != "induced power factor"]  # it follows from the lift
     np.testing.assert_allclose(wake.numbers, [row.ours for row in rows], rtol=1e-9)
     margins = [row.limits.high - row.limits.reference for row in rows]
     np.testing.assert_allclose(data.margin, margins, rtol=1e-12)

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
+from rotorjax.rotor.catalogue import load
 from rotorjax.validation import caradonna_tung, ground, momentum, step
 from rotorjax.validation.case import Subject
 from rotorjax.validation.cases import CASES, chosen_cases
 from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, section_lift, tip_path
+from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import needed, point, twist_of
-from rotorjax.validation.reference import Path
+from rotorjax.validation.reference import Hover, Path, induced_power_factor
+from rotorjax.validation.reference import caradonna_tung as caradonna_tung_data
 
 
 def test_the_tip_vortex_starts_on_the_blade_and_is_the_solutions_own(coarse_hover):
@@ -33,10 +36,25 @@ def test_section_lift_is_the_solutions_loading(coarse_hover):
     np.testing.assert_allclose(0.5 * sigma * lift * r**2, coarse_hover.dct_dr[0], rtol=0.05, atol=1e-4)
 
 
+def test_a_wakes_own_lift_asks_for_the_wakes_own_power(coarse_hover):
+    solution = coarse_hover
+    own = Hover(solution.CT, solution.r, section_lift(solution, solution.r))
+    asked = measured_power_factor(solution.model.rotor, solution.model.operating, own)
+    assert asked == pytest.approx(induced_power_factor(solution.CT, solution.CP_induced), rel=0.02)
+
+
+def test_more_lift_at_the_same_pitch_asks_for_less_power():
+    measured = caradonna_tung_data()
+    factors = [
+        measured_power_factor(*load("caradonna_tung"), measured._replace(lift=f * measured.lift)) for f in (1, 1.03)
+    ]
+    assert factors[0] - factors[1] == pytest.approx(0.046, abs=0.004)
+
+
 def test_the_measured_rotors_rows(coarse_hover):
     assert coarse_hover.converged
     found = caradonna_tung.compare(Subject(), {caradonna_tung.AT: coarse_hover})
-    assert len(found.rows) == 18
+    assert len(found.rows) == 19
     for row in found.rows:  # coarse, so near and not within what is allowed
         assert row.ours == pytest.approx(row.limits.reference, rel=0.4, abs=0.1)
     exact = [replace(row, ours=row.limits.reference) for row in found.rows]

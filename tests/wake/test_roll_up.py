@@ -1,5 +1,6 @@
 """Roll-up: conservation, smoothness and limits."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from rotorjax.errors import InputError
 from rotorjax.wake.model import free_wake
-from rotorjax.wake.roll_up import release, tip_share, trailers
+from rotorjax.wake.roll_up import release, tip_point, tip_share, trailers
 from rotorjax.wake.settings import wake_settings
 
 RULES = {
@@ -31,6 +32,34 @@ def test_far_filaments_carry_no_net_circulation(uh60, rule, inboard):
     model = model_of(uh60, rule, inboard)
     found = release(model, model.leading, loading(model))
     assert abs(float(jnp.sum(found.strength))) < 1e-16
+
+
+def rolled(model):
+    """A row whose edge has rolled up: spirals in the (r, z) plane, tighter towards the tip."""
+    r = model.edges
+    turn = 0.02 / (1.01 - r)
+    return jnp.stack([r - 0.02 * jnp.sin(turn) ** 2, 0.1 * r, 0.02 * jnp.sin(turn)], axis=-1)
+
+
+@pytest.mark.parametrize("band", [0.0, 0.01, 0.015])
+def test_on_a_straight_row_the_tip_vortex_starts_at_its_station(uh60, band):
+    model = model_of(uh60, "impulse", (0.45, 0.75), release_band=band)
+    found = tip_point(model, model.leading)
+    np.testing.assert_allclose(found, [float(model.settings.release), 0, 0], atol=1e-12)
+
+
+def test_the_place_has_derivatives_by_station_and_band(uh60):
+    model = model_of(uh60, "impulse", (0.45, 0.75))
+
+    def place(numbers):
+        moved = eqx.tree_at(lambda m: (m.settings.release, m.settings.release_band), model, tuple(numbers))
+        return tip_point(moved, rolled(moved))
+
+    at, step = jnp.array([0.971, 0.015]), 1e-7
+    forward, reverse = jax.jacfwd(place)(at), jax.jacrev(place)(at)
+    differences = [(place(at + e) - place(at - e)) / (2 * step) for e in step * jnp.eye(2)]
+    np.testing.assert_allclose(forward, reverse, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(forward, jnp.stack(differences, -1), rtol=1e-6, atol=1e-8)
 
 
 @pytest.mark.parametrize("inboard", [(0.45,), (0.45, 0.75), (0.25, 0.5, 0.75)])

@@ -23,6 +23,7 @@ from rotorjax.wake.settings import quick_settings, wake_settings
         ("inboard", (0.5, 0.4)),
         ("tip_core", 0.0),
         ("inboard_decay", -1.0),
+        ("release_band", 0.2),
         ("sharpness", float("nan")),
     ],
 )
