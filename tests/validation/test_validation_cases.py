@@ -39,7 +39,8 @@ def test_section_lift_is_the_solutions_loading(coarse_hover):
 def test_a_wakes_own_lift_asks_for_the_wakes_own_power(coarse_hover):
     solution = coarse_hover
     own = Hover(solution.CT, solution.r, section_lift(solution, solution.r))
-    asked = measured_power_factor(solution.model.rotor, solution.model.operating, own)
+    panels = solution.model.settings.panels
+    asked = measured_power_factor(solution.model.rotor, solution.model.operating, own, panels)
     assert asked == pytest.approx(induced_power_factor(solution.CT, solution.CP_induced), rel=0.02)
 
 
