@@ -77,7 +77,7 @@ def continuation(
     solve(x, p, memory): finds the solution at p from the guess x; `memory` is that of the last outcome (pass it on to
     `newton` to reuse a factorised Jacobian, or ignore it). step, smallest, largest: first, least and greatest step in
     p, by default 1/10, 1/1000 and 1/2 of the way. A step grows by half after at most `easy` iterations and is
-    quartered where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and than
+    halved where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and than
     twice the step it was to correct. Guesses are extrapolated from the last two solutions; carry(x, p, p') moves a
     solution from p to p' where its main part is known (a wake with the ground), and only the rest is extrapolated.
 
@@ -107,7 +107,7 @@ def continuation(
             outcomes.append(found)
             step = min(step * 1.5, largest) if found.iterations <= easy else step
             continue
-        failed, step = found, min(step, abs(left)) / 4
+        failed, step = found, min(step, abs(left)) / 2
         if step < smallest or found.interrupted:
             why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}, step {step:.2g}: {found.why}"
             break

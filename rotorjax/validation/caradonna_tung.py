@@ -82,12 +82,11 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
 
 
 KNOWN = (
-    "The tip vortex contracts more than was measured, as it does in Landgrebe's fit to other rotors, which ours agrees "
-    "with: at 360° the two measurements are 0.054 R apart. No setting tried takes more than 0.012 R of it away "
-    "(cores, fading, filaments, panels, near wake; a draught through the rotor of 1 m/s takes 0.007 R). "
-    "At r = 0.5 lift is too small because the inboard filaments fade with age: at 0.4 a turn in place of 0.5 it is "
-    "inside, but then the ground has too much effect at h = 0.75 and 1. With the measured tip vortex in place of the "
-    "computed one lift there comes within 3 %, and at r = 0.96 it falls to −16 % (benchmarks/prescribed_path.py): what "
-    "is missing there, a quarter of a chord from the tip, is not the wake's path."
+    "The tip vortex contracts more than was measured, as it does in Landgrebe's fit to other rotors: at 360° the two "
+    "measurements are 0.054 R apart. Part of it is the price of fading: an inboard filament that fades takes impulse "
+    "with it. With all of that kept (impulse_kept = 1) the vortex is 0.040 R inside at 360°, but C_T is 7 % too large; "
+    "no other setting takes more than 0.012 R away (cores, filaments, panels, near wake; a draught through the rotor "
+    "of 1 m/s takes 0.007 R). Lift at 0.8, 0.89 and 0.96 R is met by little, and how it is read between control "
+    "points is worth 3 % there (docs/free_wake.md)."
 )
 CASE = ValidationCase(NAME, "Caradonna and Tung's rotor at 8°", points, compare, KNOWN)

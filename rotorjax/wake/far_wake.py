@@ -149,13 +149,29 @@ def segment_ages(model: FreeWake) -> Float[np.ndarray, " S"]:
     return model.settings.age_step * _steps(model)[0]
 
 
-def fading(model: FreeWake) -> Float[Array, "F S"]:
-    """Factors on the segments' strengths: the turns a segment stands for; inboard filaments also fade with age."""
+def node_ages(model: FreeWake) -> Float[np.ndarray, " A_F"]:
+    """Age (rad) of the far filaments' free nodes, counted from the blade."""
     settings = model.settings
-    weight = jnp.asarray(_steps(model)[1])
-    turns = (segment_ages(model) - settings.age_step * settings.near_ages) / (2 * np.pi)
-    decay = jnp.exp(-settings.inboard_decay * turns)
-    return jnp.stack([weight] + [weight * decay] * (settings.filaments - 1))
+    return settings.age_step * (settings.near_ages + 1 + np.arange(settings.far_ages))
+
+
+def turns_each(model: FreeWake) -> Float[np.ndarray, " S"]:
+    """How many turns each far segment stands for, closure included."""
+    return _steps(model)[1]
+
+
+def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray, " S"]) -> Float[Array, "F S"]:
+    """What far filaments of these strengths have left at these ages (rad, from the blade).
+
+    Inboard filaments fade, and the impulse of a turn, Σ Γ r², changes as they do: but for the share `impulse_kept`, for
+    which the tip vortex gives up (r_i/r_tip)² of what the filament released at r_i loses.
+    """
+    settings = model.settings
+    turns = (age - settings.age_step * settings.near_ages) / (2 * np.pi)
+    left = jnp.exp(-settings.inboard_decay * turns)
+    arms = (jnp.asarray(settings.inboard, float) / settings.release) ** 2
+    tip = strength[0] + settings.impulse_kept * (arms @ ((1 - left) * strength[1:]))
+    return jnp.concatenate([tip[None], left * strength[1:]])
 
 
 def cores(model: FreeWake, tip_strength: Float[Array, ""]) -> Float[Array, "F S"]:

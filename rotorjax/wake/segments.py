@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.wake.far_wake import closure, cores, fading
+from rotorjax.wake.far_wake import closure, cores, faded, segment_ages, turns_each
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.roll_up import Release, release, trailers
 
@@ -60,7 +60,7 @@ def far_filaments(model: FreeWake, state: WakeState, start: Release, psi: Float[
     return Segments(
         nodes[:, :-1].reshape(-1, 3),
         nodes[:, 1:].reshape(-1, 3),
-        (strength * fading(model)).ravel(),
+        (faded(model, strength, segment_ages(model)) * turns_each(model)).ravel(),
         cores(model, start.strength[0]).ravel(),
     )
 

@@ -60,6 +60,7 @@ def helical(uh60):
         turbulence=0.0,
         self_induction_core=0.01,
         inboard=(0.45,),
+        impulse_kept=0.0,
     )
     model = free_wake(*uh60, None, settings)
     return eqx.tree_at(lambda m: m.operating.viscosity, model, jnp.asarray(1e-9))

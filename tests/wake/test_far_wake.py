@@ -9,7 +9,7 @@ import pytest
 from rotorjax.ground import Plane
 from rotorjax.rotor.catalogue import load
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.far_wake import REACH, closure, fading, repeats
+from rotorjax.wake.far_wake import REACH, closure, faded, node_ages, repeats, segment_ages, turns_each
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.roll_up import Release
 from rotorjax.wake.segments import far_filaments
@@ -21,7 +21,8 @@ ZERO = jnp.zeros(())
 
 def model_of(height=None, **settings):
     ground = None if height is None else Plane(jnp.asarray(height, float), jnp.zeros(()))
-    settings = wake_settings(panels=5, near_wake_deg=60.0, inboard_decay=0.0, turbulence=0.0, **settings)
+    usual = {"panels": 5, "near_wake_deg": 60.0, "inboard_decay": 0.0, "turbulence": 0.0}
+    settings = wake_settings(**(usual | settings))
     return free_wake(*load("uh60"), ground, settings)
 
 
@@ -72,7 +73,54 @@ def test_every_turn_is_counted_once():
     assert np.all(after > ends - np.array(weight))
     assert np.all(after <= ends - (np.array(weight) - 1) / 2)
     per_turn = model.settings.steps_per_turn
-    assert float(jnp.sum(fading(model)[0])) == pytest.approx(per_turn * (model.settings.free_turns + ends[-1]))
+    assert np.sum(turns_each(model)) == pytest.approx(per_turn * (model.settings.free_turns + ends[-1]))
+
+
+def left_of(model):
+    """Made-up strengths of the filaments at their release, (F,), and what is left at the free nodes, (F, A_F)."""
+    settings = model.settings
+    released = jnp.asarray([0.9, *(-0.5, -0.4)[: settings.filaments - 1]])
+    strength = jnp.broadcast_to(released[:, None], (settings.filaments, settings.far_ages))
+    return released, faded(model, strength, node_ages(model))
+
+
+def test_inboard_filaments_fade_and_the_tip_vortex_does_not():
+    model = model_of(inboard_decay=0.5, impulse_kept=0.0)
+    released, left = left_of(model)
+    turns = np.arange(1, model.settings.far_ages + 1) / model.settings.steps_per_turn
+    np.testing.assert_array_equal(left[0], released[0])
+    np.testing.assert_allclose(left[1:], np.outer(released[1:], np.exp(-0.5 * turns)), rtol=1e-12)
+    assert segment_ages(model)[0] == pytest.approx(node_ages(model)[0] - 0.5 * model.settings.age_step)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_the_impulse_of_a_turn_changes_by_what_is_not_kept(share):
+    model = model_of(inboard_decay=0.5, impulse_kept=share)
+    released, left = left_of(model)
+    r2 = jnp.asarray([float(model.settings.release), *model.settings.inboard]) ** 2
+    lost = (left[1:] - released[1:, None]).T @ r2[1:]
+    assert float(lost[-1]) > 0.1
+    np.testing.assert_allclose(left.T @ r2 - released @ r2, (1 - share) * lost, atol=1e-14)
+
+
+def test_what_is_left_has_its_derivatives():
+    model = model_of(inboard_decay=0.5, impulse_kept=0.3)
+
+    def of(values):
+        names = ("inboard_decay", "impulse_kept", "release")
+        return left_of(eqx.tree_at(lambda m: [getattr(m.settings, n) for n in names], model, list(values)))[1]
+
+    values = jnp.asarray([0.5, 0.3, 0.97])
+    step = 1e-5 * jnp.eye(3)
+    differences = jnp.stack([(of(values + s) - of(values - s)) / 2e-5 for s in step], axis=-1)
+    forward = jax.jit(jax.jacfwd(of))(values)
+    np.testing.assert_allclose(forward, differences, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(jax.jit(jax.jacrev(of))(values), forward, rtol=1e-12, atol=1e-15)
+
+
+def test_without_inboard_filaments_nothing_fades():
+    released, left = left_of(model_of(inboard=(), roll_up="paper", inboard_decay=0.5, impulse_kept=1.0))
+    np.testing.assert_array_equal(left, jnp.full(left.shape, released[0]))
 
 
 def test_far_above_a_plane_the_closure_is_that_of_free_air():

@@ -94,7 +94,12 @@ def test_a_wake_and_its_mirror_image_in_a_vertical_plane(case):
 def test_self_induction_restores_a_rings_speed(uh60):
     """Local part plus the cut-out ring's own speed is that of the whole ring with a Lamb-Oseen core."""
     settings = wake_settings(
-        age_step_deg=5.0, near_wake_deg=20.0, free_turns=2.0, roll_up="maximum", self_induction_core=0.01
+        age_step_deg=5.0,
+        near_wake_deg=20.0,
+        free_turns=2.0,
+        inboard=(0.45,),
+        impulse_kept=0.0,
+        self_induction_core=0.01,
     )
     model = free_wake(*uh60, None, settings)
     age = settings.age_step * np.arange(1, settings.far_ages + 1)

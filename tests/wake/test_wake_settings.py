@@ -24,6 +24,7 @@ from rotorjax.wake.settings import quick_settings, wake_settings
         ("tip_core", 0.0),
         ("inboard_decay", -1.0),
         ("release_band", 0.2),
+        ("impulse_kept", 1.5),
         ("sharpness", float("nan")),
     ],
 )
