@@ -16,6 +16,7 @@ from rotorjax.errors import InputError
 from rotorjax.ground import Plane, pitched
 from rotorjax.inflow.momentum import hover_inflow
 from rotorjax.ode.anderson import anderson
+from rotorjax.ode.continuation import continuation
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
@@ -140,10 +141,25 @@ def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimme
     slices = rigid.state.near.shape[0]
     z = InWake(rigid.unknowns, jnp.full(slices, float(coning)), jnp.zeros(slices), controls.at[1:].set(0.0))
     if rigid.converged:
-        outcome = stages.newton("trim", z, p, TOL)
+        outcome = _to_thrust(rigid.CT, z, p, stages)
     else:
         outcome = Outcome(z, rigid.residual, (rigid.residual,), 0, False, f"rigid blades: {rigid.why}", 0.0)
     return TrimmedInWake(outcome.x, p, outcome, stages.iterations + rigid.iterations)
+
+
+def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcome:
+    """Trim at the wanted thrust from z, which has this one; near the ground one step may be too far."""
+
+    def at(s):
+        return eqx.tree_at(lambda q: q.thrust, p, (1 - s) * thrust + s * p.thrust)
+
+    def step(guess, s, memory):
+        return stages.newton("trim", guess, at(s), TOL if s == 1 else 1e-5)
+
+    branch = continuation(step, z, 0.0, 1.0, step=1.0, smallest=0.1, largest=1.0, jump=0.3)
+    if branch.reached or branch.failed is None:
+        return branch.last
+    return replace(branch.failed, why=f"on the way to the thrust: {branch.why}")
 
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
