@@ -1,8 +1,8 @@
 """Induced power over the number of blades and their twist: `python benchmarks/induced_power.py`.
 
 Is it twist or the number of blades that takes Caradonna and Tung's rotor beyond 1.25 times the ideal power? Its blades
-are twisted by 9° and 18°, or made four of half the chord; the UH-60's lose their twist. Collectives give about
-the thrust of the rotor as it is; the wake's settings are the default.
+are twisted by 9° and 18°, or made four of half the chord; the UH-60's lose their twist. The wake's settings are the
+default.
 """
 
 from collections.abc import Callable
@@ -23,10 +23,9 @@ Change = Callable[[Rotor], Rotor]
 
 
 def twisted(washout_deg: float) -> Change:
-    """The same blades, straight but for a twist that falls linearly by this from axis to tip."""
-    return lambda rotor: eqx.tree_at(
-        lambda r: r.twist.values, rotor, -jnp.deg2rad(washout_deg) * jnp.asarray(rotor.twist.stations)
-    )
+    """The same blades with a twist that falls linearly by this from axis to tip in place of their own."""
+    washout = jnp.deg2rad(washout_deg)
+    return lambda rotor: eqx.tree_at(lambda r: r.twist.values, rotor, -washout * rotor.twist.stations)
 
 
 def halved(rotor: Rotor) -> Rotor:

@@ -82,12 +82,11 @@ def wake_arrays(found: Simulated, at: np.ndarray) -> dict[str, xr.DataArray]:
     x, u = jax.tree.map(lambda v: v[at], (found.flown.x, found.flown.u))
     looks = _all_seen(x, u, p)
     settings = p.settings
-    ages = np.rad2deg(settings.age_step) * (settings.near_ages + np.arange(settings.far_ages + 1))
     degrees = {"units": "deg"}
     coords = {
         "frame": at,
         "filament": ["tip vortex", *(f"inboard {r:g} R" for r in settings.inboard)],
-        "age": ("age", ages, degrees),
+        "age": ("age", np.rad2deg(settings.filament_ages), degrees),
         "near_age": ("near_age", np.rad2deg(settings.age_step) * np.arange(settings.near_ages + 1), degrees),
         "axis": ["aft", "starboard", "up"],
     }

@@ -121,12 +121,14 @@ class _Stages:
         self._progress, self.iterations = progress, 0
 
     def done(self, stage: str, outcome: Outcome) -> Outcome:
+        """Count and show an outcome, and hand it on."""
         self.iterations += outcome.iterations
         if self._progress is not None:
             self._progress(stage, outcome.residual)
         return outcome
 
     def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+        """Newton-Krylov on wake, blades and controls together."""
         linear = Krylov(forcing=0.03, restart=120, restarts=1)
         return self.done(stage, newton(residual, z, p, linear=linear, tol=tol, max_iterations=12))
 

@@ -149,12 +149,6 @@ def segment_ages(model: FreeWake) -> Float[np.ndarray, " S"]:
     return model.settings.age_step * _steps(model)[0]
 
 
-def node_ages(model: FreeWake) -> Float[np.ndarray, " A_F"]:
-    """Age (rad) of the far filaments' free nodes, counted from the blade."""
-    settings = model.settings
-    return settings.age_step * (settings.near_ages + 1 + np.arange(settings.far_ages))
-
-
 def turns_each(model: FreeWake) -> Float[np.ndarray, " S"]:
     """How many turns each far segment stands for, closure included."""
     return _steps(model)[1]
@@ -167,7 +161,7 @@ def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray,
     which the tip vortex gives up (r_i/r_tip)² of what the filament released at r_i loses.
     """
     settings = model.settings
-    turns = (age - settings.age_step * settings.near_ages) / (2 * np.pi)
+    turns = (age - settings.filament_ages[0]) / (2 * np.pi)
     left = jnp.exp(-settings.inboard_decay * turns)
     arms = (jnp.asarray(settings.inboard, float) / settings.release) ** 2
     tip = strength[0] + settings.impulse_kept * (arms @ ((1 - left) * strength[1:]))

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.far_wake import faded, node_ages
+from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
 from rotorjax.wake.roll_up import Release
 from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, near_lattice, releases
@@ -146,6 +146,6 @@ def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]
     step = jnp.sqrt(jnp.sum(tangent**2, axis=-1, keepdims=True))
     binormal = jnp.cross(tangent, bend) / step**3
     log = jnp.log(2 * step / model.settings.self_induction_core) - 0.444
-    strength = faded(model, slice_.gamma_far, node_ages(model))[0]
+    strength = faded(model, slice_.gamma_far, model.settings.filament_ages[1:])[0]
     own = strength[:, None] / (4 * jnp.pi) * log * binormal
     return jnp.zeros_like(slice_.far).at[0].set(own)

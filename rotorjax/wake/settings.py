@@ -101,6 +101,11 @@ class WakeSettings(eqx.Module):
         return round(self.free_turns * self.steps_per_turn)
 
     @property
+    def filament_ages(self) -> Float[np.ndarray, " A_F+1"]:
+        """Age (rad, from the blade) of the far filaments' nodes: where they are released, then the free ones."""
+        return self.age_step * (self.near_ages + np.arange(self.far_ages + 1))
+
+    @property
     def steps_per_turn(self) -> int:
         """Age steps in one turn."""
         return round(360 / self.age_step_deg)

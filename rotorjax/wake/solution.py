@@ -163,7 +163,7 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
         CP_profile=float(now.profile),
         mean_inflow=float(now.mean_inflow),
         tip_vortex=np.asarray(rotate_about_shaft(tip, psi[:, None])),
-        tip_vortex_age=settings.age_step * (settings.near_ages + np.arange(settings.far_ages + 1)),
+        tip_vortex_age=settings.filament_ages,
         residuals=tuple(search.residuals),
     )
     wall, compiling = clock.read()

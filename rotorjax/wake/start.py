@@ -27,7 +27,7 @@ def prescribed(model: FreeWake, inflow: float = 0.055) -> Unknowns:
         ],
         axis=-1,
     )
-    age = step * (settings.near_ages + np.arange(1, settings.far_ages + 1))
+    age = settings.filament_ages[1:]
     passage = 2 * np.pi / model.rotor.blades
     depth = inflow * np.where(age < passage, 0.4 * age, 0.4 * passage + (age - passage))
     radius = 0.78 + 0.22 * np.exp(-0.3 * age)

@@ -105,9 +105,8 @@ def test_the_files(folder, flown):
     assert told["wake_change_max"] > 0
     data = netcdf.read(folder / "history.nc")
     assert data.sizes["frame"] == flown.flown.t.size
-    lag = data["lag"].sel(coordinate="0").values
-    assert lag[0] == 0
-    assert np.ptp(lag) > 0.2  # degrees: flap turns the blades forward as they rise, then drag takes them back
+    assert float(data["lag"][0, 0]) == 0
+    assert float(data["lag"].sel(coordinate="0")[-1]) > 0.2
     first = data["wake_lattice"].isel(frame=0, blade=0, near_age=0).values
     assert np.hypot(first[-1, 0] - 0.0466, first[-1, 2]) == pytest.approx(1 - 0.0466, abs=1e-4)
     wake_film(data.isel(frame=slice(0, 2)), over_a_turn(data["CT"].values), folder / "animation.gif")

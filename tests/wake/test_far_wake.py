@@ -9,7 +9,7 @@ import pytest
 from rotorjax.ground import Plane
 from rotorjax.rotor.catalogue import load
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.far_wake import REACH, closure, faded, node_ages, repeats, segment_ages, turns_each
+from rotorjax.wake.far_wake import REACH, closure, faded, repeats, segment_ages, turns_each
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.roll_up import Release
 from rotorjax.wake.segments import far_filaments
@@ -81,7 +81,7 @@ def left_of(model):
     settings = model.settings
     released = jnp.asarray([0.9, *(-0.5, -0.4)[: settings.filaments - 1]])
     strength = jnp.broadcast_to(released[:, None], (settings.filaments, settings.far_ages))
-    return released, faded(model, strength, node_ages(model))
+    return released, faded(model, strength, settings.filament_ages[1:])
 
 
 def test_inboard_filaments_fade_and_the_tip_vortex_does_not():
@@ -90,7 +90,7 @@ def test_inboard_filaments_fade_and_the_tip_vortex_does_not():
     turns = np.arange(1, model.settings.far_ages + 1) / model.settings.steps_per_turn
     np.testing.assert_array_equal(left[0], released[0])
     np.testing.assert_allclose(left[1:], np.outer(released[1:], np.exp(-0.5 * turns)), rtol=1e-12)
-    assert segment_ages(model)[0] == pytest.approx(node_ages(model)[0] - 0.5 * model.settings.age_step)
+    assert segment_ages(model)[0] == pytest.approx(np.mean(model.settings.filament_ages[:2]))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
