@@ -207,9 +207,10 @@ def _nothing() -> Figure:
 
 
 KNOWN = (
-    "The march of 0.002 R is off its linear model by curvature, at the end of a revolution and a half: 14 %, 4 % "
-    "with 5e-4 R, 1 % with 1e-4 R; C_T rises steeply at h = 1. Phases: the numbers that follow were measured with "
-    "one inboard filament and an end to the wake. If the ground comes up at once and stays (h = 1), the free wake "
+    "The march of 0.002 R is off its linear model by curvature, at the end of a revolution and a half: 14 % (an "
+    "earlier default: 13 %, 4 % with 5e-4 R, 1 % with 1e-4 R); C_T rises steeply at h = 1. Phases: the numbers that "
+    "follow were measured with one inboard filament and an end to the wake. If the ground comes up at once and stays "
+    "(h = 1), the free wake "
     "feels 0.066 ΩR over R before it moves and the finite states 0.039; it then spreads and takes all of that back "
     "within a revolution, while their cylinder keeps 0.029. Slow heave thus has less of the ground's share, which "
     "is in phase, and lags more. Fast heave is climb. The free wake's inflow falls by 0.19 of a sudden climb at "
