@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor

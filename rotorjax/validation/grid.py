@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, INK, new_figure, style
+from rotorjax.bench.plotting import FREE_WAKE, INK, new_figure, style
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.row import Against, Row, relative
