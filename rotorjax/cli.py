@@ -85,8 +85,8 @@ def _fault(error: Exception) -> str:
     place = traceback.extract_tb(error.__traceback__)[-1]
     reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
     return (
-        f"internal error: {reason} ({Path(place.filename).name}:{place.lineno}); a fault of rotorjax, not of your input: "
-        "please report it with the command, its files and what ROTORJAX_TRACEBACK=1 shows"
+        f"internal error: {reason} ({Path(place.filename).name}:{place.lineno}); a fault of rotorjax, not of your "
+        "input: please report it with the command, its files and what ROTORJAX_TRACEBACK=1 shows"
     )
 
 

@@ -1,8 +1,8 @@
 """Compiled programs, kept in a folder from one command to the next and checked before they are used.
 
-XLA takes a file of its cache for what its name says: a truncated one is never repaired, and an exchanged one gives wrong
-numbers without a word. So each program has a seal beside it, a digest of its name and content, and what has none that
-fits is removed before jax looks: the next command compiles it again. Only the folder's owner can write in it.
+Jax takes a file of its cache for what its name says: a truncated one is never repaired, and an exchanged one gives
+wrong numbers without a word. So each program has a seal beside it, a digest of its name and content, and what has none
+that fits is removed before jax looks: the next command compiles it again. Only the folder's owner can write in it.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ PROGRAM, SEAL = "-cache", ".sha256"  # jax's ending, and ours after it
 
 
 def opened() -> Path | None:
-    """Make, check, clean and trim the folder of this machine's programs; None, with a line on stderr, if it is of no use.
+    """The folder of this machine's programs, checked, cleaned and trimmed; None, with a line on stderr, if of no use.
 
     It is safe to delete at any time.
     """

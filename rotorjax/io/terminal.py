@@ -6,14 +6,14 @@ import sys
 import unicodedata
 
 OTHERS = {
-    "°": " deg", "×": "x", "·": ".", "−": "-", "–": "-", "…": "...", "→": "->", "←": "<-", "≤": "<=", "≥": ">=", "≈": "~",
-    "√": "sqrt ", "∞": "inf", "µ": "mu", "²": "^2", "³": "^3", "‖": "||", "‘": "'", "’": "'", "“": '"', "”": '"',
+    "°": " deg", "×": "x", "·": ".", "−": "-", "–": "-", "…": "...", "→": "->", "←": "<-", "≤": "<=", "≥": ">=",
+    "≈": "~", "√": "sqrt ", "∞": "inf", "µ": "mu", "²": "^2", "³": "^3", "‖": "||", "‘": "'", "’": "'", "“": '"', "”": '"',
 }  # fmt: skip
 ERRORS = "rotorjax.spelt"
 
 
 def spelt(character: str) -> str:
-    """A character in ASCII: Greek letters by their names, digits below and above the line as digits; ? where nothing is.
+    """A character in ASCII: Greek letters by their names, digits below the line as digits; ? where there is nothing.
 
     >>> "".join(map(spelt, "ΩR, λ₀, 3°"))
     'OmegaR, lambda0, 3 deg'
