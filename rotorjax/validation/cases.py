@@ -4,7 +4,18 @@ from collections.abc import Sequence
 
 from rotorjax.errors import InputError
 from rotorjax.rotor.rotor_file import closest
-from rotorjax.validation import caradonna_tung, grid, ground, heave, inflow_map, landgrebe, march, momentum, polars, step
+from rotorjax.validation import (
+    caradonna_tung,
+    grid,
+    ground,
+    heave,
+    inflow_map,
+    landgrebe,
+    march,
+    momentum,
+    polars,
+    step,
+)
 from rotorjax.validation.case import Subject, ValidationCase
 
 _ALL = (caradonna_tung, polars, momentum, landgrebe, ground, step, march, heave, inflow_map, grid)

@@ -55,7 +55,9 @@ def disk_inflow(solution: Solution, azimuths: int = 48) -> float:
     return float(inflow.mean(axis=0) @ area)
 
 
-def first_harmonic(solution: Solution, values: Float[np.ndarray, "K R"], inner: float = 0.3, outer: float = 0.9) -> complex:
+def first_harmonic(
+    solution: Solution, values: Float[np.ndarray, "K R"], inner: float = 0.3, outer: float = 0.9
+) -> complex:
     """First harmonic over azimuth of what is given at the blades, area mean over r from `inner` to `outer`.
 
     Twice the mean of values · exp(iψ): the real part goes with cos ψ, the imaginary one with sin ψ.

@@ -21,7 +21,7 @@ MEASURED = Against(SOURCE, UNCERTAINTY, AIM)
 TORQUE_ERROR = 0.01
 POWER = Against(
     "momentum theory below; above, the measured torque less the profile power of the measured section",
-    "torque ±1 %; the report asks for 1.7 times the section's drag due to lift to meet the torque, so the upper end is high",
+    "torque ±1 %; upwards more, for the report meets the torque only with 1.7 times the section's drag due to lift",
     "no actuator disk needs less than 1; no more than the torque leaves",
 )
 
