@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.rotor.checks import check_number
+from rotorjax.checks import check_number
 
 
 class OperatingPoint(eqx.Module):

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from wakes import fails_at, made_up
 
+from rotorjax.bench.single import single_case
 from rotorjax.cli import main
 from rotorjax.io import netcdf
 from rotorjax.study.run import solve_cases
-from rotorjax.study.single import single_case
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.axes import Axes
 
-from rotorjax.plotting import (
+from rotorjax.bench.plotting import (
     FREE_WAKE,
     INK,
     MODEL_STYLE,
@@ -120,7 +120,7 @@ def held_figures(result: "FreeWakeRun", folder: str | Path) -> Sequence[Path]:
 def measured_figure(result: "MeasuredRun", path: str | Path) -> None:
     """Section lift and path of the tip vortex: measured, with the default settings and with the fitted ones."""
     from rotorjax.calibration.measured import AGES_DEG
-    from rotorjax.validation.reference import caradonna_tung
+    from rotorjax.reference.published import caradonna_tung
 
     groups = np.array(result.data.groups)
     panels = {

@@ -9,6 +9,8 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import select
 from rotorjax.calibration import hayden
 from rotorjax.calibration.calibration_file import Calibration, save
 from rotorjax.calibration.figures import hayden_figure
@@ -17,8 +19,6 @@ from rotorjax.calibration.hayden import HaydenData
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import make_folder, write_json
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import select
 
 STARTS = 256
 

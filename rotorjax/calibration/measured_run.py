@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares
 
+from rotorjax.bench.settings import study_settings
 from rotorjax.calibration.calibration_file import Calibration, save
 from rotorjax.calibration.fit import Fit, Progress, conclude, judge
 from rotorjax.calibration.measured import (
@@ -27,7 +28,6 @@ from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import make_folder, write_json
-from rotorjax.study.settings import study_settings
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.preconditioner import harmonic_inverse
 from rotorjax.wake.solution import Solution, solve

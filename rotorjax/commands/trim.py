@@ -34,10 +34,10 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
+    from rotorjax.bench.plotting import save_file
+    from rotorjax.bench.single_output import check_picture
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import make_folder, write_json
-    from rotorjax.plotting import save_file
-    from rotorjax.study.single_output import check_picture
     from rotorjax.trim.curve import curve, draw, requests
     from rotorjax.trim.dispatch import numbers_of
     from rotorjax.trim.run import Request, table

@@ -7,7 +7,7 @@ import matplotlib as mpl
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.io.atomic import whole_file
 
 

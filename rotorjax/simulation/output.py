@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.coupled import inflow_velocity, stations
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.rotor import multiblade

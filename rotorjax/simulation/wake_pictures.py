@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.simulation.film import write_film
 from rotorjax.simulation.ground_view import ground_line
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rotorjax.study import wake_file
-from rotorjax.study.cases import Case
-from rotorjax.study.settings import StudySettings
+from rotorjax.bench import wake_file
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import StudySettings
 from rotorjax.trim.held import Flapped, let_flap
 from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution

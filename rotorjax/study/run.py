@@ -10,15 +10,15 @@ from typing import Protocol
 import xarray as xr
 from tqdm import tqdm
 
+from rotorjax.bench import wake_file
+from rotorjax.bench.cases import Case, neighbour
+from rotorjax.bench.record import add_finite_state
+from rotorjax.bench.schedule import Schedule
+from rotorjax.bench.settings import StudySettings, differences
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder
-from rotorjax.study import wake_file
-from rotorjax.study.cases import Case, neighbour
 from rotorjax.study.flapping import with_flapping
-from rotorjax.study.record import add_finite_state
-from rotorjax.study.schedule import Schedule
-from rotorjax.study.settings import StudySettings, differences
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.solution import Solution, rehearse, solve
 

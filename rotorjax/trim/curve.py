@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.calibration.hayden import hayden_factor
 from rotorjax.errors import InputError
 from rotorjax.trim.dispatch import check_request, numbers_of, trim_request

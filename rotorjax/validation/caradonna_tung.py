@@ -3,13 +3,13 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
+from rotorjax.reference.published import Path
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import far_pitch, section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import Point, point
-from rotorjax.validation.reference import Path
 from rotorjax.validation.row import Against, Row, absolute, relative
 
 NAME, SOURCE = "caradonna-tung", "Caradonna & Tung, NASA TM-81232"

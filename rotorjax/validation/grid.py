@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, INK, VPBFSM, new_figure, style
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, style
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import first_harmonic
 from rotorjax.validation.point import Point, point

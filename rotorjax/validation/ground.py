@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
+from rotorjax.reference import published as reference
 from rotorjax.rotor import catalogue
-from rotorjax.validation import reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import clearance, tip_path
 from rotorjax.validation.point import Point, point

@@ -9,9 +9,9 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rotorjax.bench.plotting import EXACT_IMAGE, FREE_WAKE, INK, VPBFSM, new_figure, style
 from rotorjax.errors import InputError
-from rotorjax.plotting import EXACT_IMAGE, FREE_WAKE, INK, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.heaving import Heave, Heaving, instants, marched, of_finite_states, of_free_wake
 from rotorjax.validation.point import Point, point

@@ -3,14 +3,14 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
+from rotorjax.reference.published import Path
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import solidity
-from rotorjax.validation import reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import far_pitch, tip_path
 from rotorjax.validation.point import Point, point, twist_of
-from rotorjax.validation.reference import Path
 from rotorjax.validation.row import Against, Row, absolute, relative
 
 NAME, SOURCE = "landgrebe", "Landgrebe, J. AHS 17(4), 1972"

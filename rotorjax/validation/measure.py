@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.frames import disk_points
-from rotorjax.validation.reference import Path
+from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
 from rotorjax.wake.roll_up import tip_point

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, INK, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import disk_inflow
 from rotorjax.validation.point import Point, point

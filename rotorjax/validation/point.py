@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rotorjax.bench.settings import StudySettings, study_settings
 from rotorjax.ground import plane
 from rotorjax.rotor import catalogue
-from rotorjax.study.settings import StudySettings, study_settings
 from rotorjax.wake.model import FreeWake, free_wake
 
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.row import Against, Row, absolute, between, relative

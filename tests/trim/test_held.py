@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from wakes import COARSE
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import combine
+from rotorjax.bench.record import summary_entry
+from rotorjax.bench.settings import study_settings
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.flap_lag import blade_of, flap_frequency
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import combine
 from rotorjax.study.flapping import flap_harmonics_deg, with_flapping
 from rotorjax.study.reading import Reading
-from rotorjax.study.record import summary_entry
 from rotorjax.study.report import flapping_table
-from rotorjax.study.settings import study_settings
 from rotorjax.trim.held import let_flap
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
+from rotorjax.reference.published import Hover, Path, induced_power_factor, knight_hefner
+from rotorjax.reference.published import caradonna_tung as caradonna_tung_data
 from rotorjax.rotor.catalogue import load
 from rotorjax.validation import caradonna_tung, ground, momentum, polars, step
 from rotorjax.validation.case import Subject
@@ -14,8 +16,6 @@ from rotorjax.validation.cases import CASES, chosen_cases
 from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import needed, point, twist_of
-from rotorjax.validation.reference import Hover, Path, induced_power_factor, knight_hefner
-from rotorjax.validation.reference import caradonna_tung as caradonna_tung_data
 
 
 def test_the_tip_vortex_starts_on_the_blade_and_is_the_solutions_own(coarse_hover):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from rotorjax.reference import published as reference
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import solidity
-from rotorjax.validation import landgrebe, reference
+from rotorjax.validation import landgrebe
 from rotorjax.validation.row import Against, Row, above_zero, absolute, between, relative
 
 NOTHING = Against("a source", "none", "a reason")

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from rotorjax.deck.blades import linear_blades, stations
+from rotorjax.deck.march import simulate
+from rotorjax.deck.over_ground import controls, output, over_ground, trim
+from rotorjax.deck.state_space import state_space
+from rotorjax.deck.tip_path import TipPath, blades_at, tip_path
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
-from rotorjax.potential.blades import linear_blades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
-from rotorjax.potential.march import simulate
 from rotorjax.potential.model import finite_state_model
 from rotorjax.potential.moving_ground import GroundMotion, still
-from rotorjax.potential.over_ground import controls, output, over_ground, trim
-from rotorjax.potential.state_space import state_space
-from rotorjax.potential.tip_path import TipPath, blades_at, tip_path
 from rotorjax.potential.wake_transport import wake_transport
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.flap_lag import flap_frequency

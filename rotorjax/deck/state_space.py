@@ -15,12 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Complex, Float
 
+from rotorjax.deck.over_ground import Controls, OverGround, RotorState, output, rhs
 from rotorjax.errors import InputError
 from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.orbit import make_orbit
 from rotorjax.ode.outcome import Outcome
-from rotorjax.potential.over_ground import Controls, OverGround, RotorState, output, rhs
 
 INPUTS = ("collective", "climb", "mu", "ground.height", "ground.height_rate", "ground.slope", "ground.slope_rate")
 OUTPUTS = ("uniform", "cosine", "sine", "thrust")

@@ -9,21 +9,21 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Float
 
+from rotorjax.deck.blades import SectionBlades, stations
+from rotorjax.deck.case import DeckCase
+from rotorjax.deck.march import History, simulate
+from rotorjax.deck.over_ground import Controls, Output, OverGround, controls, output, over_ground, trim
+from rotorjax.deck.tip_path import tip_path
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.potential.blades import SectionBlades, stations
-from rotorjax.potential.deck_case import DeckCase
 from rotorjax.potential.dynamics import hover_inputs
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import disk_modes, ground_table
-from rotorjax.potential.march import History, simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model
 from rotorjax.potential.moving_ground import GroundMotion, Variant, ground_states, residual
-from rotorjax.potential.over_ground import Controls, Output, OverGround, controls, output, over_ground, trim
-from rotorjax.potential.region import half_plane
-from rotorjax.potential.tip_path import tip_path
 from rotorjax.potential.wake_transport import WakeTransport, wake_transport
+from rotorjax.region import half_plane
 
 SAVED_PER_TURN = 2
 FRAMES = 60  # instants at which the field over the disk and the ground condition are kept

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.potential.blades import Stations
+from rotorjax.deck.blades import Stations
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_table import disk_modes
 from rotorjax.potential.model import FiniteStateModel

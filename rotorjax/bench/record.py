@@ -6,11 +6,11 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from rotorjax.study import finite_state
-from rotorjax.study.finite_state import FiniteStateResult, Stations
+from rotorjax.bench import finite_state
+from rotorjax.bench.finite_state import FiniteStateResult, Stations
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import case_of, is_sound
 from rotorjax.study.flapping import RIGID, flap_harmonics_deg
-from rotorjax.study.settings import StudySettings
-from rotorjax.study.wake_file import case_of, is_sound
 
 COMPARED = (0.25, 0.95)  # radii over R between which the distributions are compared
 

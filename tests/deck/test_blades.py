@@ -3,8 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rotorjax.deck.blades import SectionBlades, linear_blades, stations
 from rotorjax.errors import InputError
-from rotorjax.potential.blades import SectionBlades, linear_blades, stations
 from rotorjax.potential.loading import from_distribution, thrust_coefficient
 from rotorjax.potential.modes import rotor_modes
 from rotorjax.rotor.blade_element import disk_loading, section_loads

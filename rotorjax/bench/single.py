@@ -7,12 +7,12 @@ import jax
 import numpy as np
 import xarray as xr
 
+from rotorjax.bench import finite_state, wake_file
+from rotorjax.bench.cases import Case
+from rotorjax.bench.record import variables_of
+from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
-from rotorjax.study import finite_state, wake_file
-from rotorjax.study.cases import Case
-from rotorjax.study.record import variables_of
 from rotorjax.study.run import Progress, Solver, solve_case
-from rotorjax.study.settings import StudySettings
 from rotorjax.wake.solution import solve
 
 Model = Literal["vpbfsm", "freewake", "both"]

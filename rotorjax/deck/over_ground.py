@@ -7,7 +7,7 @@
 The ground enters through its table (`rotorjax.potential.ground_table`); what it does to the disk is a matrix–vector
 product a step. In axial flow, with the wake straight below the disk; a wind μ reaches the loads, the mass flow and a
 sloping ground, but does not skew the wake here. With a `tip_path` the blades flap, else they are rigid; flapping tilts
-the thrust, not the disk that the wake leaves (`rotorjax.potential.tip_path`).
+the thrust, not the disk that the wake leaves (`rotorjax.deck.tip_path`).
 """
 
 from typing import NamedTuple
@@ -18,15 +18,15 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from rotorjax.deck.blades import Blades, Stations, stations
+from rotorjax.deck.disk_matrices import DiskMatrices, disk_matrices
+from rotorjax.deck.tip_path import TipPath, blades_at
 from rotorjax.errors import InputError
-from rotorjax.potential.blades import Blades, Stations, stations
-from rotorjax.potential.disk_matrices import DiskMatrices, disk_matrices
 from rotorjax.potential.dynamics import RotorInputs, mass_flow, mean_induced_inflow, rate_table
 from rotorjax.potential.ground_table import GroundTable, disk_modes
 from rotorjax.potential.loading import thrust_coefficient
 from rotorjax.potential.model import FiniteStateModel
 from rotorjax.potential.moving_ground import GroundMotion, Variant, plane_velocity, require_variant
-from rotorjax.potential.tip_path import TipPath, blades_at
 from rotorjax.potential.wake_transport import WakeTransport
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from rotorjax.deck.case import read_case
 from rotorjax.errors import InputError
-from rotorjax.potential.deck_case import read_case
 
 CASE = """
 [rotor]

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from rotorjax.deck.blades import Blades, linear_blades, stations
+from rotorjax.deck.march import simulate
+from rotorjax.deck.over_ground import RotorState, controls, output, over_ground, rhs, trim
+from rotorjax.deck.state_space import heave_response, state_space
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.ode.export import to_control, to_dataset
-from rotorjax.potential.blades import Blades, linear_blades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
-from rotorjax.potential.march import simulate
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 from rotorjax.potential.moving_ground import GroundMotion, prescribed, still
-from rotorjax.potential.over_ground import RotorState, controls, output, over_ground, rhs, trim
-from rotorjax.potential.state_space import heave_response, state_space
 from rotorjax.potential.wake_transport import wake_transport
 
 TRANSPORT = wake_transport(2.2, 8)

@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from rotorjax.deck.over_ground import Controls, Output, OverGround, RotorState, output, rhs
 from rotorjax.errors import InputError
 from rotorjax.potential.moving_ground import require_increasing
-from rotorjax.potential.over_ground import Controls, Output, OverGround, RotorState, output, rhs
 
 
 class History(NamedTuple):

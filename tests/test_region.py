@@ -18,7 +18,7 @@ from rotorjax.potential.model import (
     mean_inflow,
     steady_state,
 )
-from rotorjax.potential.region import Mask, disk, half_plane, rectangle, smooth_step
+from rotorjax.region import Mask, disk, half_plane, rectangle, smooth_step
 
 LEVEL = plane(1.0)
 TAU = jnp.zeros(9).at[:3].set(jnp.array([np.sqrt(3) / 4 * 0.006, 5e-4, 2e-4]))

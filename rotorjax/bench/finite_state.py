@@ -12,6 +12,8 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
 from rotorjax.potential import loading, rigid_cylinder
 from rotorjax.potential.ground_source import DiskQuadrature, correlation
@@ -25,8 +27,6 @@ from rotorjax.potential.model import (
 )
 from rotorjax.rotor.blade_element import RotorCoefficients, SectionLoads, disk_loading, section_loads
 from rotorjax.rotor.blade_element import rotor_coefficients as coefficients_of
-from rotorjax.study.cases import Case
-from rotorjax.study.settings import StudySettings
 
 GRID_R = np.linspace(0.0, 1.0, 64)  # 64 × 72 points of the disk for pictures
 GRID_PSI = np.linspace(0.0, 2 * np.pi, 72, endpoint=False)

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from rotorjax.study import finite_state
-from rotorjax.study.cases import Case
-from rotorjax.study.record import inflow_rms_difference, stations_at
-from rotorjax.study.settings import StudySettings
-from rotorjax.study.wake_file import STATE, case_of
+from rotorjax.bench import finite_state
+from rotorjax.bench.cases import Case
+from rotorjax.bench.record import inflow_rms_difference, stations_at
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import STATE, case_of
 
 TERMS = (1, 2, 3, 4, 5)  # pressure terms compared out of ground effect (Fig. 8a)
 

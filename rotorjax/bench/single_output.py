@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from rotorjax.errors import InputError
-from rotorjax.plotting import (
+from rotorjax.bench.plotting import (
     MODEL_STYLE,
     across,
     diameter_axes,
@@ -17,9 +16,10 @@ from rotorjax.plotting import (
     shared_levels,
     style,
 )
-from rotorjax.study.record import inflow_rms_difference
-from rotorjax.study.settings import StudySettings
-from rotorjax.study.wake_file import case_of
+from rotorjax.bench.record import inflow_rms_difference
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import case_of
+from rotorjax.errors import InputError
 
 ENDINGS = (".png", ".pdf", ".svg")
 FIELDS = {

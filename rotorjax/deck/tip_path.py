@@ -16,8 +16,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.deck.blades import Stations
 from rotorjax.operating import OperatingPoint
-from rotorjax.potential.blades import Stations
 from rotorjax.rotor.flap_lag import Blade, accelerations, blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import TurningFrame

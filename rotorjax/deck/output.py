@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.io.atomic import whole_file
 
 DYNAMIC, STATIC = plotting.FREE_WAKE, plotting.VPBFSM

@@ -149,5 +149,5 @@ def step_response(
 
 
 def _rows(name: str) -> list[dict[str, str]]:
-    text = (resources.files("rotorjax.validation") / "data" / name).read_text(encoding="utf-8")
+    text = (resources.files("rotorjax.reference") / "data" / name).read_text(encoding="utf-8")
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from rotorjax.study.cases import Case
-from rotorjax.study.settings import StudySettings
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import StudySettings
 from rotorjax.wake.model import FreeWake, WakeState, free_wake
 from rotorjax.wake.solution import Solution
 

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax import __version__
+from rotorjax.checks import check_number
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import catalogue
-from rotorjax.rotor.checks import check_number
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, quick_settings, wake_settings
 
