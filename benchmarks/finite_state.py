@@ -11,15 +11,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from rotorjax.deck.blades import linear_blades, stations
+from rotorjax.deck.march import simulate
+from rotorjax.deck.over_ground import OverGround, controls, over_ground, trim
+from rotorjax.deck.tip_path import tip_path
 from rotorjax.ground import Plane, plane
-from rotorjax.potential.blades import linear_blades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
-from rotorjax.potential.march import simulate
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, inflow, mean_inflow, steady_state
 from rotorjax.potential.moving_ground import still
-from rotorjax.potential.over_ground import OverGround, controls, over_ground, trim
-from rotorjax.potential.tip_path import tip_path
 from rotorjax.potential.wake_transport import wake_transport
 from rotorjax.rotor.catalogue import load
 

@@ -12,9 +12,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
+from rotorjax.deck.blades import linear_blades
+from rotorjax.deck.over_ground import controls, output, over_ground, trim
+from rotorjax.deck.state_space import heave_response, state_space
 from rotorjax.ground import plane
-from rotorjax.potential.blades import linear_blades
 from rotorjax.potential.dynamics import costates, hover_inputs
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
@@ -27,12 +29,10 @@ from rotorjax.potential.model import (
     steady_state,
 )
 from rotorjax.potential.moving_ground import ground_states, prescribed, residual, still
-from rotorjax.potential.over_ground import controls, output, over_ground, trim
-from rotorjax.potential.region import half_plane
 from rotorjax.potential.rotors import mean_inflows, rotors, steady
-from rotorjax.potential.state_space import heave_response, state_space
 from rotorjax.potential.wake_transport import wake_transport
 from rotorjax.potential.window import delayed_costates, forgetting_rate
+from rotorjax.region import half_plane
 
 CT = 0.006
 V0 = np.sqrt(CT / 2)

@@ -12,10 +12,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
+from rotorjax.bench.settings import study_settings
+from rotorjax.reference.published import induced_power_factor, momentum_inflow
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.study.settings import study_settings
 from rotorjax.validation.measure import disk_inflow
-from rotorjax.validation.reference import induced_power_factor, momentum_inflow
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.solution import solve
 

@@ -14,12 +14,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.frames import disk_points
 from rotorjax.ground import Plane, plane
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
-from rotorjax.potential.region import half_plane
+from rotorjax.region import half_plane
 from rotorjax.validation.point import Point
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.partial_ground import PartialGround, all_segments, ground_velocity, partial_ground

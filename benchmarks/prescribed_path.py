@@ -12,7 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.validation import caradonna_tung, reference
+from rotorjax.reference import published as reference
+from rotorjax.validation import caradonna_tung
 from rotorjax.validation.measure import tip_path
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluate, evaluated, transported
 from rotorjax.wake.model import FreeWake

@@ -13,12 +13,12 @@ import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import study_settings
+from rotorjax.bench.wake_file import model_of
 from rotorjax.io.atomic import whole_file
 from rotorjax.ode.continuation import Branch, follow
 from rotorjax.ode.linear import Krylov
-from rotorjax.study.cases import Case
-from rotorjax.study.settings import study_settings
-from rotorjax.study.wake_file import model_of
 from rotorjax.wake.equilibrium import Unknowns, evaluated, residual
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.performance import performance

@@ -14,12 +14,12 @@ import time
 import jax
 from tqdm import tqdm
 
+from rotorjax.reference.published import hayden
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import solidity
 from rotorjax.trim.dispatch import numbers_of, trim_request
 from rotorjax.trim.in_wake_run import run_in_wake
 from rotorjax.trim.run import Request
-from rotorjax.validation.reference import hayden
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.settings import flight_settings, quick_settings
 

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
+from rotorjax.bench.cases import study_cases
 from rotorjax.calibration.taught import PARAMETERS, taught_model, taught_state
 from rotorjax.potential.model import disk_inflow, finite_state_model
-from rotorjax.study.cases import study_cases
 
 TRUTH = {
     "mean_gain": 1.13,

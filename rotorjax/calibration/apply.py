@@ -9,16 +9,16 @@ import optimistix as optx
 import xarray as xr
 from jaxtyping import Array, Float
 
+from rotorjax.bench import finite_state
+from rotorjax.bench.finite_state import Stations
+from rotorjax.bench.record import inflow_rms_difference, stations_at
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import case_of
 from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.errors import InputError
 from rotorjax.potential import loading
 from rotorjax.potential.model import FiniteStateModel, disk_inflow, mean_inflow
 from rotorjax.rotor.blade_element import disk_loading, rotor_coefficients, section_loads
-from rotorjax.study import finite_state
-from rotorjax.study.finite_state import Stations
-from rotorjax.study.record import inflow_rms_difference, stations_at
-from rotorjax.study.settings import StudySettings
-from rotorjax.study.wake_file import case_of
 
 
 def add_calibrated(data: xr.Dataset, settings: StudySettings, calibration: Calibration) -> xr.Dataset:

@@ -26,12 +26,12 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax import __version__
+from rotorjax.bench.finite_state import steady_state
 from rotorjax.calibration import hayden, measured, taught
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_text
 from rotorjax.potential.model import FiniteState, FiniteStateModel
-from rotorjax.study.finite_state import steady_state
 
 MODEL_VERSION = 1  # raised when the finite-state equations change so that fitted values no longer mean the same
 SETS: dict[str, ParameterSet] = {s.name: s for s in (hayden.PARAMETERS, taught.PARAMETERS, measured.PARAMETERS)}

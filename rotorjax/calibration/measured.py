@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from rotorjax.calibration.parameters import Parameter, ParameterSet
 from rotorjax.errors import InputError
 from rotorjax.ode.implicit import attach
-from rotorjax.validation import reference
+from rotorjax.reference import published as reference
 from rotorjax.wake.equilibrium import Unknowns, evaluate, residual
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.performance import performance

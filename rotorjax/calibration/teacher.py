@@ -16,6 +16,9 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Array, Float
 
+from rotorjax.bench.cases import SLOPE_HEIGHT, Case
+from rotorjax.bench.dataset import present, select
+from rotorjax.bench.record import COMPARED
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.calibration.taught import PARAMETERS, taught_model, taught_state
 from rotorjax.errors import InputError
@@ -23,9 +26,6 @@ from rotorjax.ground import Plane
 from rotorjax.io import netcdf
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import FiniteStateModel, disk_inflow, finite_state_model
-from rotorjax.study.cases import SLOPE_HEIGHT, Case
-from rotorjax.study.dataset import present, select
-from rotorjax.study.record import COMPARED
 
 FAR = 30.0  # a stand-in height where there is no ground; its effect is masked
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rotorjax.study.cases import Case
+    from rotorjax.bench.cases import Case
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +30,8 @@ def add_place(parser: argparse.ArgumentParser) -> None:
 
 def case_of(chosen: argparse.Namespace) -> "Case":
     """The case that --height and --slope ask for. Raises InputError where there is none."""
+    from rotorjax.bench.cases import Case
     from rotorjax.errors import InputError
-    from rotorjax.study.cases import Case
 
     if chosen.height is None and chosen.slope:
         raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {chosen.slope:g} deg")

@@ -12,7 +12,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="a rotor over a moving deck",
         description="Simulate a rotor over a heaving, pitching deck with the dynamic finite-state model and write "
         "history.nc, report.json, histories and disk as PNG and PDF, and on request animation.gif. "
-        "`rotorjax.potential.deck_case` shows a case file.",
+        "`rotorjax.deck.case` shows a case file.",
     )
     parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
@@ -24,12 +24,12 @@ def run(chosen: argparse.Namespace) -> int:
     """Simulate and write; the exit code."""
     from tqdm import tqdm
 
-    from rotorjax import plotting
+    from rotorjax.bench import plotting
+    from rotorjax.deck import output as deck_output
+    from rotorjax.deck.case import read_case
+    from rotorjax.deck.run import run_case
     from rotorjax.io import netcdf
     from rotorjax.io.atomic import make_folder, write_json
-    from rotorjax.potential import deck_output
-    from rotorjax.potential.deck_case import read_case
-    from rotorjax.potential.deck_run import run_case
 
     case = read_case(chosen.case)
     out = make_folder(chosen.out)

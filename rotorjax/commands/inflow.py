@@ -35,14 +35,14 @@ def run(chosen: argparse.Namespace) -> int:
     """Solve the case, print it and write what was asked for; the exit code."""
     from tqdm import tqdm
 
+    from rotorjax.bench.record import summary_entry
+    from rotorjax.bench.settings import study_settings
+    from rotorjax.bench.single import check_case, single_case
+    from rotorjax.bench.single_output import check_picture, picture, table
     from rotorjax.calibration import apply
     from rotorjax.calibration.calibration_file import load
     from rotorjax.io import netcdf
-    from rotorjax.io.atomic import make_folder, write_json
-    from rotorjax.study.record import summary_entry
-    from rotorjax.study.settings import study_settings
-    from rotorjax.study.single import check_case, single_case
-    from rotorjax.study.single_output import check_picture, picture, table
+    from rotorjax.io.atomic import check_output, write_json
 
     case = case_of(chosen)
     calibration = None if chosen.calibration is None else load(chosen.calibration)
@@ -53,8 +53,7 @@ def run(chosen: argparse.Namespace) -> int:
     check_case(case, settings)
     check_picture(chosen.plot)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
-        if path is not None:  # before the work, not after it
-            make_folder(path.parent)
+        check_output(path)  # before the work, not after it
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
 
         def progress(stage: str, residual: float) -> None:

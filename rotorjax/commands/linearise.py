@@ -40,12 +40,12 @@ def run(chosen: argparse.Namespace) -> int:
     """Solve, linearise and write; the exit code."""
     from tqdm import tqdm
 
+    from rotorjax.bench.settings import study_settings
+    from rotorjax.bench.single import check_case
     from rotorjax.commands.arguments import case_of, names_of
     from rotorjax.io.atomic import make_folder, write_json
     from rotorjax.linearisation import output
     from rotorjax.linearisation.run import Linearised, check, linearise_case, model_of
-    from rotorjax.study.settings import study_settings
-    from rotorjax.study.single import check_case
 
     case = case_of(chosen)
     settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, quick=chosen.quick)

@@ -24,16 +24,16 @@ def register(commands: argparse._SubParsersAction) -> None:
     add_rotor(parser)
     add_harmonics(parser)
     add_calibration(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, kept="; finished cases are kept, and the same command continues")
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Run the study; the exit code."""
+    from rotorjax.bench.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
+    from rotorjax.bench.settings import study_settings
     from rotorjax.calibration.calibration_file import load
-    from rotorjax.study.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
     from rotorjax.study.output import write_all
     from rotorjax.study.run import solve_cases
-    from rotorjax.study.settings import study_settings
 
     started = time.perf_counter()
     heights = (QUICK_HEIGHTS if chosen.quick else HEIGHTS) if chosen.heights is None else chosen.heights

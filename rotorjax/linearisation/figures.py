@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
 from rotorjax.linearisation.marching import Response
 from rotorjax.linearisation.waves import Spectrum
 from rotorjax.ode.models import LinearModel
-from rotorjax.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
 
 MOST = 4
 """Outputs that are drawn; tables hold all."""

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
+from rotorjax.bench.markdown import table
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.marching import STEPS
 from rotorjax.linearisation.reduce import HIGHEST
 from rotorjax.linearisation.run import TOL, Linearised
 from rotorjax.ode.export import save_mat, save_netcdf
-from rotorjax.study.markdown import table
 from rotorjax.wake.solution import Solution
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.assembly import assemble
@@ -16,8 +18,6 @@ from rotorjax.linearisation.system import NODES, check_names, linear_wake, order
 from rotorjax.linearisation.waves import Spectrum, spectrum
 from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.models import LinearModel, PeriodicModel
-from rotorjax.study.cases import Case
-from rotorjax.study.settings import StudySettings
 from rotorjax.wake import solution
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.model import FreeWake, free_wake

@@ -25,7 +25,7 @@ from rotorjax.ground import Plane
 from rotorjax.potential.ellipsoidal import ellipsoidal
 from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions
 from rotorjax.potential.modes import ModeTable
-from rotorjax.potential.region import Region
+from rotorjax.region import Region
 
 OFF_REGION = 0.1  # weight of the condition "no source" off the region against that of the flow on it
 

@@ -25,8 +25,8 @@ from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import rotor_on_ground, source_solver
 from rotorjax.potential.model import FiniteStateModel, footprint, ground_upflow
 from rotorjax.potential.modes import ModeTable, ground_modes
-from rotorjax.potential.region import HalfPlane
 from rotorjax.potential.wake_transport import WakeTransport, transported_flow
+from rotorjax.region import HalfPlane
 
 
 class GroundTable(eqx.Module):

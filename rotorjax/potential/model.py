@@ -30,7 +30,7 @@ from rotorjax.potential.ground_source import (
 )
 from rotorjax.potential.loading import thrust_coefficient
 from rotorjax.potential.modes import ModeTable, ground_modes, rotor_modes
-from rotorjax.potential.region import Region
+from rotorjax.region import Region
 
 MassFlow = Literal["paper", "linear"]
 
@@ -87,7 +87,7 @@ def finite_state_model(
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
     terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only); even_terms: see
-    `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground (`rotorjax.potential.region`,
+    `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground (`rotorjax.region`,
     best with ground_parity "odd", ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk, 1
     by default. Raises InputError where a count, b, p, mass_flow, ground_parity or ground_radius is not allowed.
     """

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.interpolate import PchipInterpolator
 
+from rotorjax.checks import check_number
 from rotorjax.errors import InputError
-from rotorjax.rotor.checks import check_number
 
 # The rule is used as it stands to M = 0.7; above, its Mach number levels off towards 0.85 so that it stays finite
 # through M = 1.

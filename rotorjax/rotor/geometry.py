@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.checks import check_number, check_stations, refuse
 from rotorjax.rotor.airfoil import AirfoilTable
-from rotorjax.rotor.checks import check_number, check_stations, refuse
 
 _GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 

@@ -11,8 +11,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from rotorjax.checks import check_number
 from rotorjax.frames import rotate_about_shaft, to_ellipsoidal
-from rotorjax.rotor.checks import check_number
 
 
 class RotorInputs(eqx.Module):

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from rotorjax import plotting
+from rotorjax.bench import plotting
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json
 from rotorjax.simulation import output

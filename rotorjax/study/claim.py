@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rotorjax.study.cases import Case
+from rotorjax.bench.cases import Case
 
 GOOD_AGREEMENT = (
     0.10  # "good agreement", "closely matches": an rms of 10 % of the mean inflow; the paper gives no number

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import present
-from rotorjax.study.markdown import table
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import present
+from rotorjax.bench.markdown import table
 from rotorjax.study.reading import Reading, listed
 
 ZONES = {"root (0.25–0.5)": (0.25, 0.5), "middle (0.5–0.8)": (0.5, 0.8), "tip (0.8–0.95)": (0.8, 0.95)}

@@ -8,7 +8,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import (
+from rotorjax.bench.cases import SLOPE_HEIGHT, STEEP_DEG, Case
+from rotorjax.bench.dataset import present, select
+from rotorjax.bench.plotting import (
     FREE_WAKE,
     INK,
     MODEL_STYLE,
@@ -23,8 +25,6 @@ from rotorjax.plotting import (
     shared_levels,
     style,
 )
-from rotorjax.study.cases import SLOPE_HEIGHT, STEEP_DEG, Case
-from rotorjax.study.dataset import present, select
 
 LOADING = r"$\mathrm{d}C_T/\mathrm{d}\bar{r}$"
 INFLOW = "inflow / mean OGE inflow of the free wake"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rotorjax.study.cases import Case
+from rotorjax.bench.cases import Case
 from rotorjax.study.claim import GOOD_AGREEMENT, MISSING, OGE, Verdict
 from rotorjax.study.reading import Reading, falls, listed
 

@@ -7,16 +7,16 @@ from typing import Any
 
 import xarray as xr
 
+from rotorjax.bench.dataset import combine, reference_inflow
+from rotorjax.bench.record import inflow_rms_difference, summary_entry
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import case_of
 from rotorjax.calibration import apply
 from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json, write_text
-from rotorjax.study.dataset import combine, reference_inflow
 from rotorjax.study.figures import draw_all
-from rotorjax.study.record import inflow_rms_difference, summary_entry
 from rotorjax.study.report import report
-from rotorjax.study.settings import StudySettings
-from rotorjax.study.wake_file import case_of
 
 
 def write_all(

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import xarray as xr
 
-from rotorjax.study.cases import SLOPE_HEIGHT, Case
-from rotorjax.study.dataset import present, select
-from rotorjax.study.record import COMPARED, rms_difference
+from rotorjax.bench.cases import SLOPE_HEIGHT, Case
+from rotorjax.bench.dataset import present, select
+from rotorjax.bench.record import COMPARED, rms_difference
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,13 @@ from json import loads
 import numpy as np
 import xarray as xr
 
-from rotorjax.study.cases import Case
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import present
+from rotorjax.bench.flapping import flap_harmonics_deg
+from rotorjax.bench.markdown import table
 from rotorjax.study.claim import Claim
 from rotorjax.study.claims import checks, paper_claims
-from rotorjax.study.dataset import present
 from rotorjax.study.divergence import where_they_part
-from rotorjax.study.flapping import flap_harmonics_deg
-from rotorjax.study.markdown import table
 from rotorjax.study.reading import Reading
 
 TABLE_R = (0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.95)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from rotorjax.study.cases import SLOPE_HEIGHT, STEEP_DEG, Case
+from rotorjax.bench.cases import SLOPE_HEIGHT, STEEP_DEG, Case
 from rotorjax.study.claim import GOOD_AGREEMENT, MISSING, Verdict
 from rotorjax.study.reading import Reading, falls, listed
 

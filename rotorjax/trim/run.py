@@ -7,12 +7,12 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from rotorjax.checks import check_number
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.inflow.choice import inflow_model
 from rotorjax.rotor import catalogue
-from rotorjax.rotor.checks import check_number
 from rotorjax.rotor.geometry import solidity
 from rotorjax.trim.problem import Aim, Flight, Trim, TrimResidual, cyclic, outputs_at
 from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, trim

@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.checks import check_number
 from rotorjax.coupled import CoupledRotor, RotorState, sections_of
 from rotorjax.errors import InputError
 from rotorjax.inflow.momentum import hover_inflow
 from rotorjax.ode.implicit import attach
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
-from rotorjax.rotor.checks import check_number
 from rotorjax.rotor.geometry import chord, solidity, twist
 from rotorjax.trim.problem import Controls, Flight, Trim, TrimResidual, inputs_at, outputs_at
 

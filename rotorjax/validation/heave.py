@@ -9,9 +9,9 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rotorjax.bench.plotting import EXACT_IMAGE, FREE_WAKE, INK, VPBFSM, new_figure, style
 from rotorjax.errors import InputError
-from rotorjax.plotting import EXACT_IMAGE, FREE_WAKE, INK, VPBFSM, new_figure, style
-from rotorjax.validation import reference
+from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.heaving import Heave, Heaving, instants, marched, of_finite_states, of_free_wake
 from rotorjax.validation.point import Point, point
@@ -143,12 +143,11 @@ def _phase_row(name: str, z: Each[complex]) -> Row:
 
 
 def _slopes_differ(height: float) -> float:
-    """Share by which the two formulas' slopes over height differ, of Hayden's."""
-    step = 1e-4
-    one, other = (
-        (f(height + step) - f(height - step)) / (2 * step) for f in (reference.hayden, reference.cheeseman_bennett)
-    )
-    return abs(one - other) / abs(one)
+    """Share by which the slopes of what is known of ground effect over height differ, of their mean."""
+    step = 0.1  # as far apart as the measured curve's points
+    known = (reference.hayden, reference.cheeseman_bennett, reference.isolated_rotors)
+    slopes = [f(height + step) - f(height - step) for f in known]
+    return float(np.ptp(slopes) / np.mean(slopes))
 
 
 LOOKS: Each[dict[str, Any]] = Each(

@@ -28,6 +28,9 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Array, Complex, Float
 
+from rotorjax.deck.blades import SectionBlades, stations
+from rotorjax.deck.over_ground import controls, output, over_ground, trim
+from rotorjax.deck.state_space import state_space
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.linearisation.assembly import velocities_along
@@ -37,13 +40,10 @@ from rotorjax.ode.harmonic import average
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.threads import one_thread
 from rotorjax.ode.trajectory import march
-from rotorjax.potential.blades import SectionBlades, stations
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
 from rotorjax.potential.model import finite_state_model
 from rotorjax.potential.moving_ground import Variant, still
-from rotorjax.potential.over_ground import controls, output, over_ground, trim
-from rotorjax.potential.state_space import state_space
 from rotorjax.potential.wake_transport import wake_transport
 from rotorjax.wake.dynamics import WakeInputs, driven, inputs_of, rhs
 from rotorjax.wake.model import FreeWake, WakeState

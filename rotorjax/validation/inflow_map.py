@@ -17,8 +17,8 @@ from jaxtyping import Array, Float
 from matplotlib.figure import Figure
 from scipy.signal import resample
 
+from rotorjax.bench.plotting import new_figure, polar_contour, shared_levels, style
 from rotorjax.inflow.finite_state import FiniteStateInflow
-from rotorjax.plotting import new_figure, polar_contour, shared_levels, style
 from rotorjax.potential.dynamics import with_ground
 from rotorjax.potential.model import velocity
 from rotorjax.rotor.geometry import chord
@@ -68,7 +68,7 @@ class Measured(NamedTuple):
 
 def measured() -> Measured:
     """The map that ships with the package."""
-    text = (resources.files("rotorjax.validation") / "data" / "elliott_althoff_mu015.csv").read_text(encoding="utf-8")
+    text = (resources.files("rotorjax.reference") / "data" / "elliott_althoff_mu015.csv").read_text(encoding="utf-8")
     rows = list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
     columns = [np.array([float(row[k]) for row in rows]) for k in ("psi", "r/R", "Mean", "std")]
     once = columns[0] < 360  # 360° repeats 0°

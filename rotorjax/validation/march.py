@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.disturbance import Disturbed, Fastest, disturbed, fastest, thrust
 from rotorjax.validation.point import Point, point

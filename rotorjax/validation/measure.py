@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.frames import disk_points
-from rotorjax.validation.reference import Path
+from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
 from rotorjax.wake.roll_up import tip_point
@@ -53,6 +53,18 @@ def disk_inflow(solution: Solution, azimuths: int = 48) -> float:
     area = np.diff(edges**2)
     area[0] += edges[0] ** 2
     return float(inflow.mean(axis=0) @ area)
+
+
+def first_harmonic(
+    solution: Solution, values: Float[np.ndarray, "K R"], inner: float = 0.3, outer: float = 0.9
+) -> complex:
+    """First harmonic over azimuth of what is given at the blades, area mean over r from `inner` to `outer`.
+
+    Twice the mean of values · exp(iψ): the real part goes with cos ψ, the imaginary one with sin ψ.
+    """
+    weights = np.where((solution.r > inner) & (solution.r < outer), solution.r * solution.widths, 0.0)
+    over_azimuth = 2 * np.mean(values * np.exp(1j * solution.psi)[:, None], axis=0)
+    return complex(over_azimuth @ weights / weights.sum())
 
 
 def clearance(solution: Solution) -> float:

@@ -6,9 +6,9 @@ from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
 from rotorjax.operating import OperatingPoint
+from rotorjax.reference.published import Hover, induced_power_factor
 from rotorjax.rotor.airfoil import lift_drag
 from rotorjax.rotor.geometry import Rotor, twist
-from rotorjax.validation.reference import Hover, induced_power_factor
 from rotorjax.wake.lifting_surface import chord_downwash
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings

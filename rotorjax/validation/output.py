@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from rotorjax import __version__, plotting
+from rotorjax import __version__
+from rotorjax.bench import plotting
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.validation.report import report
 from rotorjax.validation.run import Validation

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 
-from rotorjax.study.markdown import table
+from rotorjax.bench.markdown import table
 from rotorjax.validation.case import ValidationCase
 from rotorjax.validation.row import Row
 from rotorjax.validation.run import Validation

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from tqdm import tqdm
 
-from rotorjax.study.schedule import Schedule
+from rotorjax.bench.schedule import Schedule
 from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.point import Point, needed
 from rotorjax.validation.row import Row

@@ -4,11 +4,11 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, style
 from rotorjax.errors import InputError
 from rotorjax.linearisation.marching import nonlinear_step
-from rotorjax.plotting import FREE_WAKE, VPBFSM, new_figure, style
+from rotorjax.reference import published as reference
 from rotorjax.rotor.geometry import solidity
-from rotorjax.validation import reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.row import Against, Row, relative

@@ -53,8 +53,10 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
 
     Out of ground effect the turn moves on by its own pitch, and with the wind. Over ground it comes down at a speed
     that goes as tanh(z/REACH), so at a steady one far above the plane and as in a stagnation flow next to it, and its
-    radius grows so that the flow through it is kept. As h → ∞ the second becomes the first. A wake cut off without
-    closure expands and bunches at its end and pulls the inflow at the disk with it.
+    radius grows so that the flow through it is kept. A jet that meets the plane aslant keeps what moves it along the
+    plane: it comes down along the shaft and runs off downhill, and the stagnation point lies uphill. As h → ∞ all this
+    becomes the first. A wake cut off without closure expands and bunches at its end and pulls the inflow at the disk
+    with it.
     """
     turn = model.settings.steps_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
@@ -88,7 +90,9 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     fall = after * (_log_sinh(mean_before) - _log_sinh(mean))[:, None, None]
     lower = _lowered(x[:, None], fall)
     wider = jnp.exp(0.5 * (fall + _log_cosh(lower) - _log_cosh(x)[:, None]))
-    spread = flat[:, None] * wider[..., None] + REACH * lower[..., None] * normal
+    downhill = normal - np.array([0.0, 0.0, 1.0]) / normal[2]
+    run = REACH * _along(x[:, None], lower)[..., None] * downhill
+    spread = (flat[:, None] + run) * wider[..., None] + REACH * lower[..., None] * normal
     return _in_line(model, foot + after[..., None] * drift + spread)
 
 
@@ -110,8 +114,32 @@ def _lowered(x: Float[Array, "*n"], fall: Float[Array, "*n"]) -> Float[Array, "*
     return jnp.where(high, from_high, jnp.arcsinh(jnp.sinh(jnp.where(high, 0.0, x)) * jnp.exp(-fall)))
 
 
+def _along(x: Float[Array, "*n"], lower: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """How far a uniform flow of speed 1 along the plane carries what falls from x to `lower` as dx/dt = −tanh x does.
+
+    In place of before it, that is over the widening √(tanh x/tanh lower): ∫ √(tanh y/tanh x)⁻¹ dt along the way, with
+    ∫ dy/√tanh y = artanh √tanh y + arctan √tanh y.
+    """
+    return (_slow_down(x) - _slow_down(lower)) / _root(x)
+
+
+def _slow_down(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    root = _root(x)
+    # artanh u as ½ ln((1 + u)² (1 + u²)/(1 − u⁴)), and 1 − tanh² = cosh⁻²
+    return jnp.log1p(root) + 0.5 * jnp.log1p(root**2) + _log_cosh(_lifted(x)) + jnp.arctan(root)
+
+
+def _root(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    return jnp.sqrt(jnp.tanh(_lifted(x)))
+
+
+def _lifted(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """x, smoothly kept above LEAST."""
+    return 0.5 * (x + jnp.sqrt(x**2 + (2 * LEAST / REACH) ** 2))
+
+
 def _log_sinh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    x = 0.5 * (x + jnp.sqrt(x**2 + (2 * LEAST / REACH) ** 2))
+    x = _lifted(x)
     return x + jnp.log(-0.5 * jnp.expm1(-2 * x))
 
 

@@ -15,7 +15,7 @@ has vorticity in the air. Over a vortex ring the axial component then comes out 
 (benchmarks/partial_ground.py).
 
 Beside the region air passes through the plane as if no ground were near: the sheet lets out below what it keeps out
-above, as that of the finite-state model does (`rotorjax.potential.region`), and the edge sheds no vorticity. Cores
+above, as that of the finite-state model does (`rotorjax.region`), and the edge sheds no vorticity. Cores
 spoil the identity a little: a segment with a core r_c is no potential flow, by (r_c/d)² of it at the distance d.
 """
 
@@ -28,7 +28,7 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.ground import Plane
-from rotorjax.potential.region import Region
+from rotorjax.region import Region
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.field import wake_segments
 from rotorjax.wake.model import FreeWake, WakeState, slices

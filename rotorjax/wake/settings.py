@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.checks import check_number
 from rotorjax.errors import InputError
-from rotorjax.rotor.checks import check_number
 
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from wakes import made_up
 
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import combine
+from rotorjax.bench.settings import study_settings
+from rotorjax.bench.single import single_case
 from rotorjax.calibration import apply, hayden, taught
 from rotorjax.calibration.calibration_file import Calibration, save
 from rotorjax.cli import main
 from rotorjax.errors import InputError
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import combine
 from rotorjax.study.output import summary
 from rotorjax.study.report import report
-from rotorjax.study.settings import study_settings
-from rotorjax.study.single import single_case
 
 PRINTED = {
     "hayden": Calibration("hayden", hayden.PARAMETERS.table(hayden.PARAMETERS.printed), True, 0.18),

@@ -2,10 +2,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rotorjax.bench.finite_state import steady_state as climbing_state
 from rotorjax.calibration.taught import PARAMETERS, PRINTED_REACH, taught_model, taught_state
 from rotorjax.ground import plane
 from rotorjax.potential.model import disk_inflow, finite_state_model, steady_state
-from rotorjax.study.finite_state import steady_state as climbing_state
 
 PRINTED = jnp.asarray(PARAMETERS.printed)
 TAU = jnp.zeros(9).at[:4].set(jnp.array([2.6e-3, 6e-4, 3e-4, 1e-4]))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from known_study import TRUTH, known_study
 
+from rotorjax.bench.record import rms_difference
 from rotorjax.calibration import freewake_run, teacher
 from rotorjax.calibration.taught import PARAMETERS
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
-from rotorjax.study.record import rms_difference
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from rotorjax.wake.settings import wake_settings
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr("rotorjax.study.settings.quick_settings", lambda **more: wake_settings(**COARSE | more))
+    monkeypatch.setattr("rotorjax.bench.settings.quick_settings", lambda **more: wake_settings(**COARSE | more))
 
 
 @pytest.mark.slow

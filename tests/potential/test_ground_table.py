@@ -10,8 +10,8 @@ from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import disk_modes, disk_projection, ground_table, response
 from rotorjax.potential.model import finite_state_model, ground_upflow
-from rotorjax.potential.region import half_plane
 from rotorjax.potential.wake_transport import wake_transport
+from rotorjax.region import half_plane
 
 QUADRATURE = DiskQuadrature(12, 16)
 MODEL = finite_state_model(harmonics=1, radial_terms=2, ground_harmonics=1, quadrature=QUADRATURE)

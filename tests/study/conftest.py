@@ -5,10 +5,10 @@ import time
 import pytest
 from wakes import made_up
 
-from rotorjax.study.cases import HEIGHTS, SLOPES_DEG, study_cases
-from rotorjax.study.dataset import combine
+from rotorjax.bench.cases import HEIGHTS, SLOPES_DEG, study_cases
+from rotorjax.bench.dataset import combine
+from rotorjax.bench.settings import study_settings
 from rotorjax.study.run import solve_cases
-from rotorjax.study.settings import study_settings
 
 
 @pytest.fixture(scope="session")

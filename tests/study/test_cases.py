@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from rotorjax.bench.cases import HEIGHTS, SLOPES_DEG, Case, neighbour, study_cases
 from rotorjax.errors import InputError
-from rotorjax.study.cases import HEIGHTS, SLOPES_DEG, Case, neighbour, study_cases
 
 
 def test_the_papers_cases():

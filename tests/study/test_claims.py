@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rotorjax.bench.cases import Case
 from rotorjax.study import claims, level_claims, slope_claims
-from rotorjax.study.cases import Case
 from rotorjax.study.reading import Reading, falls
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import TERMS, _turned, combine, select
-from rotorjax.study.record import rms_difference, summary_entry
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import TERMS, _turned, combine, select
+from rotorjax.bench.record import rms_difference, summary_entry
 
 
 def test_every_array_is_labelled(merged):

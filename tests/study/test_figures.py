@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from rotorjax.plotting import across, refine_azimuth, shared_levels
-from rotorjax.study.cases import Case
-from rotorjax.study.dataset import select
+from rotorjax.bench.cases import Case
+from rotorjax.bench.dataset import select
+from rotorjax.bench.plotting import across, refine_azimuth, shared_levels
 from rotorjax.study.figures import FIGURES, across_disk
 
 PAPER = ["06", "07", "08a", "08b", "09", "10a", "10b", "11", "12", "13", "14a", "14b", "15", "16a", "16b"]

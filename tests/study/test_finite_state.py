@@ -4,14 +4,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from rotorjax.bench import finite_state
+from rotorjax.bench.cases import Case
+from rotorjax.bench.finite_state import GRID_PSI, GRID_R, Stations
+from rotorjax.bench.settings import study_settings
 from rotorjax.errors import InputError
 from rotorjax.potential import model as potential
 from rotorjax.potential import rigid_cylinder
 from rotorjax.rotor.blade_element import disk_loading, section_loads
-from rotorjax.study import finite_state
-from rotorjax.study.cases import Case
-from rotorjax.study.finite_state import GRID_PSI, GRID_R, Stations
-from rotorjax.study.settings import study_settings
 
 EDGES = np.linspace(0.1, 1.0, 41)
 STATIONS = Stations(

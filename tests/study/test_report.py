@@ -3,11 +3,11 @@
 import json
 from pathlib import Path
 
+from rotorjax.bench.cases import HEIGHTS, SLOPES_DEG, study_cases
+from rotorjax.bench.markdown import table
 from rotorjax.io import netcdf
-from rotorjax.study.cases import HEIGHTS, SLOPES_DEG, study_cases
 from rotorjax.study.claims import paper_claims
 from rotorjax.study.divergence import contraction
-from rotorjax.study.markdown import table
 from rotorjax.study.reading import Reading
 
 

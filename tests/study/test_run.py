@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from wakes import fails_at, made_up
 
+from rotorjax.bench import wake_file
+from rotorjax.bench.cases import Case, study_cases
+from rotorjax.bench.settings import study_settings
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
-from rotorjax.study import wake_file
-from rotorjax.study.cases import Case, study_cases
 from rotorjax.study.run import solve_case, solve_cases
-from rotorjax.study.settings import study_settings
 
 CASES = study_cases([1.0, 2.0], [15.0])
 

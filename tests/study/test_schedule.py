@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from rotorjax.study.schedule import Schedule
+from rotorjax.bench.schedule import Schedule
 
 NEEDS = {"a": None, "b": None, "c": "a", "d": "b", "e": "d"}
 
@@ -59,7 +59,7 @@ def test_an_interrupt_stops_workers_at_their_next_check(monkeypatch):
         def join(self, timeout=None):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("rotorjax.study.schedule.threading.Thread", Interrupting)
+    monkeypatch.setattr("rotorjax.bench.schedule.threading.Thread", Interrupting)
     with pytest.raises(KeyboardInterrupt):
         schedule.run(1)
     assert ended.wait(10)

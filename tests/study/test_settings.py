@@ -5,8 +5,8 @@ from dataclasses import replace
 import equinox as eqx
 import pytest
 
+from rotorjax.bench.settings import differences, study_settings
 from rotorjax.errors import InputError
-from rotorjax.study.settings import differences, study_settings
 
 
 def test_fingerprint_is_reproducible_and_sees_every_change():

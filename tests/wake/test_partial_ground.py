@@ -9,7 +9,7 @@ import pytest
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import plane
-from rotorjax.potential.region import half_plane
+from rotorjax.region import half_plane
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.field import velocity as wake_velocity
 from rotorjax.wake.model import WakeState, free_wake

@@ -1,0 +1,147 @@
+"""One finished case as a labelled data set (both models), and its entry in summary.json."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from rotorjax.bench import finite_state
+from rotorjax.bench.finite_state import FiniteStateResult, Stations
+from rotorjax.bench.flapping import RIGID, flap_harmonics_deg
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.wake_file import case_of, is_sound
+
+COMPARED = (0.25, 0.95)  # radii over R between which the distributions are compared
+
+# name in the data set: (attribute of the result, dimensions, description)
+FIELDS: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "vpbfsm_tau": ("tau", ("mode",), "VPBFSM: pressure coefficients τ (Eq. 2)"),
+    "vpbfsm_inflow": ("inflow", ("station_azimuth", "radius"), "VPBFSM, printed factor: inflow over ΩR, positive down"),
+    "exact_image_inflow": (
+        "exact_image_inflow",
+        ("station_azimuth", "radius"),
+        "VPBFSM over the exact image of its wake: inflow over ΩR, positive down",
+    ),
+    "vpbfsm_dct_dr": ("dct_dr", ("station_azimuth", "radius"), "loading of the pressure terms: dC_T/d(r/R)"),
+    "vpbfsm_inflow_grid": (
+        "inflow_grid",
+        ("grid_azimuth", "grid_radius"),
+        "VPBFSM, printed factor: inflow over ΩR on a grid",
+    ),
+    "vpbfsm_dct_dr_grid": ("dct_dr_grid", ("grid_azimuth", "grid_radius"), "loading of the pressure terms on a grid"),
+    "exact_image_inflow_diameter": (
+        "exact_image_diameter",
+        ("side", "grid_radius"),
+        "VPBFSM over the exact image: inflow over ΩR on the mountain (0) and valley (1) side",
+    ),
+    "vpbfsm_mean_inflow": ("mean_inflow", (), "VPBFSM, printed factor: area-weighted mean inflow over ΩR"),
+    "exact_image_mean_inflow": (
+        "exact_image_mean_inflow",
+        (),
+        "VPBFSM, exact image: mean inflow over ΩR",
+    ),
+    "vpbfsm_ground_normal_velocity_rms": (
+        "ground_normal_velocity_rms",
+        (),
+        "VPBFSM: rms normal velocity left on the ground inside the wake radius over that of the incoming flow",
+    ),
+}
+
+
+def stations_of(data: xr.Dataset, settings: StudySettings) -> Stations:
+    """The free wake's radii, at as many azimuths as its cases on a slope have, so that all cases share one grid."""
+    psi = 2 * np.pi / settings.wake.azimuths * np.arange(settings.wake.azimuths)
+    if data.sizes["azimuth"] not in (1, psi.size):
+        psi = data["azimuth"].to_numpy()
+    return stations_at(data, psi)
+
+
+def stations_at(data: xr.Dataset, psi: np.ndarray) -> Stations:
+    """The radii and panel widths of a data set at azimuths psi (rad)."""
+    return Stations(*(jnp.asarray(v, float) for v in (data["radius"].to_numpy(), data["panel_width"].to_numpy(), psi)))
+
+
+def add_finite_state(data: xr.Dataset, settings: StudySettings) -> xr.Dataset:
+    """Add the VPBFSM driven by the free wake's loads; unchanged where these cannot drive it."""
+    if not is_sound(data):
+        return data
+    stations = stations_of(data, settings)
+    result = finite_state.from_loads(case_of(data), settings, data["free_wake_dct_dr"].to_numpy(), stations)
+    return data.assign(variables_of(result, stations))
+
+
+def variables_of(result: FiniteStateResult, stations: Stations) -> dict[str, Any]:
+    """A VPBFSM result as labelled variables with their grids."""
+    grid = {
+        "station_azimuth": ("station_azimuth", np.asarray(stations.psi), {"units": "rad"}),
+        "grid_azimuth": ("grid_azimuth", finite_state.GRID_PSI, {"units": "rad"}),
+        "grid_radius": ("grid_radius", finite_state.GRID_R, {"units": "1", "long_name": "radius over R"}),
+    }
+    found = {
+        name: (dims, np.asarray(getattr(result, attribute)), {"units": "1", "long_name": about})
+        for name, (attribute, dims, about) in FIELDS.items()
+    }
+    return grid | found
+
+
+def rms_difference(
+    ours: np.ndarray, theirs: np.ndarray, r: np.ndarray, widths: np.ndarray, between: tuple[float, float] = COMPARED
+) -> float:
+    """Area-weighted rms of the difference of two distributions (K, R) over the annulus `between` (radii over R)."""
+    inside = (r >= between[0]) & (r <= between[1])
+    weights = np.where(inside, r * widths, 0.0)
+    if not weights.any():
+        return float("nan")
+    return float(np.sqrt(np.mean(np.sum(weights * (ours - theirs) ** 2, axis=-1)) / weights.sum()))
+
+
+def inflow_rms_difference(data: xr.Dataset, reference: float, model: str = "vpbfsm") -> float | None:
+    """Rms difference of a model's inflow ("vpbfsm" or "exact_image") and the free wake's, both over `reference`."""
+    if f"{model}_inflow" not in data or "free_wake_inflow" not in data:
+        return None
+    ours, theirs = data[f"{model}_inflow"].to_numpy(), data["free_wake_inflow"].to_numpy()
+    return rms_difference(
+        ours / reference, theirs / reference, data["radius"].to_numpy(), data["panel_width"].to_numpy()
+    )
+
+
+def summary_entry(data: xr.Dataset, reference: float | None) -> dict[str, Any]:
+    """The entry of a case in summary.json; reference: the free wake's mean inflow out of ground effect, over ΩR."""
+    case = case_of(data)
+    return {
+        "height": case.height,
+        "slope_deg": case.slope_deg,
+        "free_wake": _free_wake_entry(data) if "free_wake_inflow" in data else None,
+        "vpbfsm": _finite_state_entry(data) if "vpbfsm_inflow" in data else None,
+        "inflow_rms_difference": None if reference is None else inflow_rms_difference(data, reference),
+        "wall_time_s": float(data["wall_time_s"]),
+        "compile_time_s": float(data["compile_time_s"]),
+        **({"flapping": _flapping_entry(data)} if "flap" in data else {}),
+    }
+
+
+def _flapping_entry(data: xr.Dataset) -> dict[str, Any]:
+    angles = zip(("beta_0_deg", "beta_1c_deg", "beta_1s_deg"), flap_harmonics_deg(data), strict=True)
+    return dict(angles) | {name: float(data[name]) for name in RIGID}
+
+
+def _free_wake_entry(data: xr.Dataset) -> dict[str, Any]:
+    return {
+        "CT": float(data["CT"]),
+        "CP_induced": float(data["CP_induced"]),
+        "mean_inflow": float(data["free_wake_mean_inflow"]),
+        "residual": float(data["free_wake_residual"]),
+        "converged": bool(data["converged"]),
+        "ground_normal_velocity_rms": float(data["free_wake_ground_normal_velocity_rms"]),
+    }
+
+
+def _finite_state_entry(data: xr.Dataset) -> dict[str, Any]:
+    entry = {
+        "mean_inflow": float(data["vpbfsm_mean_inflow"]),
+        "ground_normal_velocity_rms": float(data["vpbfsm_ground_normal_velocity_rms"]),
+    }
+    if "free_wake_inflow" not in data:  # its own blade loads: what the free wake's entry holds otherwise
+        entry |= {"CT": float(data["CT"]), "CP_induced": float(data["CP_induced"])}
+    return entry

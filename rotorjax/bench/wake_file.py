@@ -1,0 +1,114 @@
+"""A free-wake solution as a labelled data set, and back: what a finished case keeps."""
+
+import json
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from rotorjax.bench.cases import Case
+from rotorjax.bench.settings import StudySettings
+from rotorjax.wake.model import FreeWake, WakeState, free_wake
+from rotorjax.wake.solution import Solution
+
+STATE = "wake_state_"
+# name in the data set: (attribute of the solution, dimensions, description)
+ARRAYS: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "radius": ("r", ("radius",), "radius of the control points, over R"),
+    "panel_width": ("widths", ("radius",), "width of the blade panels, over R"),
+    "azimuth": ("psi", ("azimuth",), "azimuth in rad: 0 aft (mountain), counter-clockwise seen from above"),
+    "free_wake_dct_dr": ("dct_dr", ("azimuth", "radius"), "free wake: dC_T/d(r/R) (Eq. 17)"),
+    "free_wake_inflow": ("inflow", ("azimuth", "radius"), "free wake: induced inflow over ΩR, positive down"),
+    "free_wake_circulation": ("circulation", ("azimuth", "radius"), "free wake: bound circulation over ΩR²"),
+    "tip_vortex": (
+        "tip_vortex",
+        ("azimuth", "age", "xyz"),
+        "tip vortex of the blade at this azimuth, over R, hub frame",
+    ),
+    "age": ("tip_vortex_age", ("age",), "wake age of the tip vortex in rad"),
+}
+NUMBERS: dict[str, tuple[str, str]] = {
+    "CT": ("CT", "thrust coefficient T/(ρA(ΩR)²)"),
+    "CP": ("CP", "power coefficient P/(ρA(ΩR)³)"),
+    "CP_induced": ("CP_induced", "induced part of the power coefficient"),
+    "CP_profile": ("CP_profile", "profile part of the power coefficient"),
+    "free_wake_mean_inflow": ("mean_inflow", "free wake: area-weighted mean induced inflow over ΩR"),
+    "free_wake_residual": ("residual", "free wake: rms node displacement over one revolution, over R"),
+    "free_wake_load_change": ("load_change", "free wake: relative change of C_T over one more revolution"),
+    "free_wake_ground_normal_velocity_rms": (
+        "ground_normal_velocity_rms",
+        "free wake: rms normal velocity on the ground over √(C_T/2)",
+    ),
+    "iterations": ("iterations", "iterations of the free wake's solver"),
+    "wall_time_s": ("wall_time_s", "wall-clock time of the free wake's solution in s, compilation included"),
+    "compile_time_s": ("compile_time_s", "part of the wall-clock time spent compiling, in s"),
+    "converged": ("converged", "1 where the free wake converged"),
+}
+_NO_VALUE = float("nan")
+
+
+def to_dataset(case: Case, solution: Solution, settings: StudySettings) -> xr.Dataset:
+    """Pack a solution: arrays, numbers, the whole wake state, and the settings it was made with."""
+    data = xr.Dataset(attrs={"case": case.name, "why": solution.why, "fingerprint": settings.fingerprint()})
+    data.attrs["settings"] = json.dumps(settings.table(), ensure_ascii=False)
+    climb = {"inflow": settings.climb_ratio, "mean_inflow": settings.climb_ratio}  # kept is what is induced
+    for name, (attribute, dims, about) in ARRAYS.items():
+        values = np.asarray(getattr(solution, attribute), float) - climb.get(attribute, 0.0)
+        data[name] = (dims, values, {"units": _unit(about), "long_name": about})
+    for name, (attribute, about) in NUMBERS.items():
+        value = getattr(solution, attribute)
+        value = _NO_VALUE if value is None else float(value) - climb.get(attribute, 0.0)
+        data[name] = ((), value, {"units": _unit(about), "long_name": about})
+    for name in WakeState.__dataclass_fields__:
+        values = np.asarray(getattr(solution.state, name))
+        dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
+        data[STATE + name] = (dims, values, {"units": "1", "long_name": f"free-wake state {name}, rotor units"})
+    return data.assign(place_of(case))
+
+
+def place_of(case: Case) -> dict[str, Any]:
+    """Height and slope of a case as scalar variables."""
+    height = _NO_VALUE if case.height is None else case.height
+    return {
+        "height": ((), height, {"units": "1", "long_name": "height of the hub over the ground, over R; NaN: none"}),
+        "slope_deg": ((), case.slope_deg, {"units": "degree", "long_name": "slope of the ground"}),
+    }
+
+
+def case_of(data: xr.Dataset) -> Case:
+    """The case that a data set holds."""
+    height = float(data["height"])
+    return Case(None if np.isnan(height) else height, float(data["slope_deg"]))
+
+
+def is_sound(data: xr.Dataset) -> bool:
+    """Whether loads, inflow and state are finite and the rotor thrusts upward."""
+    names = ["free_wake_dct_dr", "free_wake_inflow", "CT", *(n for n in data.data_vars if str(n).startswith(STATE))]
+    return all(bool(np.all(np.isfinite(data[n]))) for n in names) and float(data["CT"]) > 0
+
+
+def model_of(case: Case, settings: StudySettings) -> FreeWake:
+    """The free wake of a case."""
+    return free_wake(settings.rotor, settings.operating, case.ground, settings.wake)
+
+
+def to_solution(data: xr.Dataset, settings: StudySettings) -> Solution:
+    """Rebuild the solution, to start a neighbour from it."""
+    fields: dict[str, Any] = {a: data[n].to_numpy() for n, (a, _, _) in ARRAYS.items()}
+    fields |= {a: float(data[n]) for n, (a, _) in NUMBERS.items()}
+    fields["converged"], fields["iterations"] = bool(fields["converged"]), int(fields["iterations"])
+    if np.isnan(fields["ground_normal_velocity_rms"]):
+        fields["ground_normal_velocity_rms"] = None
+    names = WakeState.__dataclass_fields__
+    state = WakeState(**{name: jnp.asarray(data[STATE + name].to_numpy()) for name in names})
+    fields |= {"model": model_of(case_of(data), settings), "state": state, "why": data.attrs["why"]}
+    for name in ("inflow", "mean_inflow"):
+        fields[name] = fields[name] + settings.climb_ratio
+    return Solution(**{name: value for name, value in fields.items() if name in Solution.__dataclass_fields__})
+
+
+def _unit(about: str) -> str:
+    if " in rad" in about:
+        return "rad"
+    return "s" if " in s" in about else "1"
