@@ -51,7 +51,7 @@ def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
 def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
     """Flat vector of a state and the way back, after checking that it is made of finite floating-point numbers.
 
-    On the host, where nothing needs compiling; `unravelled` is the way back there. Raises InputError where a leaf is
+    On the host, where nothing needs compiling; there the way back is `unravelled`. Raises InputError where a leaf is
     not.
     """
     leaves, _ = jax.tree_util.tree_flatten_with_path(x)
@@ -61,12 +61,18 @@ def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[
                 f"Argument `{name}` must hold floating-point arrays only, but {jax.tree_util.keystr(path) or 'it'} "
                 f"is {jnp.result_type(leaf)}: cast it or pass it elsewhere"
             )
-    flat = np.concatenate([np.ravel(leaf) for _, leaf in leaves]) if leaves else np.zeros(0)
+    flat, unravel = ravelled(x)
     if not np.all(np.isfinite(flat)):
         raise InputError(f"Argument `{name}` must be finite, but holds NaN or infinity")
+    return flat, unravel
+
+
+def ravelled(x: PyTree) -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
+    """`jax.flatten_util.ravel_pytree` of numbers, on the host."""
+    flat = np.concatenate([np.zeros(0), *(np.ravel(leaf) for leaf in jax.tree.leaves(x))])
     ways = []
-    jax.eval_shape(lambda x: ways.append(ravel_pytree(x)[1]), x)  # traced: hashable, and the same for every x alike
-    return jnp.asarray(flat), ways[0]
+    jax.eval_shape(lambda x: ways.append(ravel_pytree(x)[1]), x)  # hashable, and equal for all x of one structure
+    return jnp.asarray(flat, jnp.result_type(float, *jax.tree.leaves(x))), ways[0]
 
 
 def unravelled(unravel: Callable[[Array], PyTree], flat: Float[np.ndarray, " n"]) -> PyTree:
