@@ -199,7 +199,7 @@ def _preconditioned(f: Callable, unravel: Callable, x: Array, args: PyTree, v: A
 def _operator(apply: Callable[[Array], Array], like: Array) -> LinearOperator:
     def matvec(v: np.ndarray) -> np.ndarray:
         # A copy: GMRES writes into what it gets, and jax's arrays are read-only.
-        return np.array(apply(jnp.asarray(v, like.dtype).ravel()))
+        return np.array(apply(jnp.asarray(np.ravel(v), like.dtype)))
 
     # cast: the checker takes the class, whose __new__ builds a subclass, for the subclass.
     return cast(Any, LinearOperator)((like.size, like.size), matvec=matvec, dtype=like.dtype)

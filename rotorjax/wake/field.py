@@ -11,7 +11,7 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
-from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, near_lattice, releases
+from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
 
 
 class Velocities(NamedTuple):
@@ -41,13 +41,13 @@ def node_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array,
     control = jax.vmap(lambda k: model.of_slice(k).control)(numbers)
     nodes = [a.reshape(len(a), -1, 3) for a in (control, state.near, state.far)]
     targets = jnp.concatenate(nodes, axis=1)
-    places = _together(rotate_about_shaft(targets, angles[:, None]), model.rotor.blades)
-    induced = _apart(_at_instants(model, wake_segments(model, state, psi), places, angles), len(targets))
-    v = rotate_about_shaft(induced, -angles[:, None])
+    segments = wake_segments(model, state, psi)
+    places = _together(_turned(targets, angles), model.rotor.blades)
+    v = _turned(_apart(_at_instants(model, segments, places, angles), len(targets)), -angles)
     v = v + jax.vmap(lambda points, angle: undisturbed(model, points, angle))(targets, angles)
     v = jnp.split(v, np.cumsum([part.shape[1] for part in nodes])[:-1], axis=1)
     near, far = (part.reshape(a.shape) for part, a in zip(v[1:], (state.near, state.far), strict=True))
-    sharpened = jax.vmap(lambda k, slice_: _sharpened(model.of_slice(k), slice_))(numbers, state)
+    sharpened = jax.vmap(lambda *both: _sharpened(model, *both))(control, segments)
     bent = jax.vmap(lambda k, slice_: self_induction(model.of_slice(k), slice_))(numbers, state)
     return Velocities(v[0] + sharpened, near, far + bent)
 
@@ -77,9 +77,7 @@ def _at_instants(
     The ground is fixed in that frame. K = 1: every blade's wake is the same. Else slices i, i + I, i + 2I … are the
     blades' wakes at instant i.
     """
-    turned = segments._replace(
-        start=rotate_about_shaft(segments.start, angles[:, None]), end=rotate_about_shaft(segments.end, angles[:, None])
-    )
+    turned = segments._replace(start=_turned(segments.start, angles), end=_turned(segments.end, angles))
     blades = model.rotor.blades if len(angles) == 1 else 1
     of_instants = jax.tree.map(lambda a: _together(a, model.rotor.blades), turned)
 
@@ -90,6 +88,11 @@ def _at_instants(
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
     return jax.lax.map(one, (places, of_instants))
+
+
+def _turned(vectors: Float[Array, "K n 3"], angles: Float[Array, " K"]) -> Float[Array, "K n 3"]:
+    """Vectors of each slice turned by its angle; an axisymmetric wake (K = 1) is the same at all azimuths."""
+    return vectors if len(angles) == 1 else rotate_about_shaft(vectors, angles[:, None])
 
 
 def _together(a: Float[Array, "K n *rest"], blades: int) -> Float[Array, "I m *rest"]:
@@ -125,15 +128,14 @@ def undisturbed(model: FreeWake, points: Float[Array, "N 3"], angle: Float[Array
     return carried(model, angle) - jnp.cross(rotate_about_shaft(model.flight.turn, -angle), points)
 
 
-def _sharpened(model: FreeWake, slice_: WakeState) -> Float[Array, "R 3"]:
+def _sharpened(model: FreeWake, control: Float[Array, "R 3"], segments: Segments) -> Float[Array, "R 3"]:
     """What the blade's own near wake adds at its control points when its core is small there.
 
     The core that keeps the lattice smooth at its own nodes would smear the tip loss, where panels are narrower than
     it, and the circulation would end at the tip with a finite value.
     """
-    settings = model.settings
-    lattice = near_lattice(model, slice_, settings.near_core)
-    return sharpened_velocity(model.control, *lattice, fine=settings.control_core)
+    lattice = jax.tree.map(lambda a: a[: lattice_segments(model)], segments)
+    return sharpened_velocity(control, *lattice, fine=model.settings.control_core)
 
 
 def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]:

@@ -44,8 +44,8 @@ class Release(NamedTuple):
 
 def trailers(gamma: Float[Array, "R ..."]) -> Float[Array, "R+1 ..."]:
     """Strength γ_i = Γ_{i−1} − Γ_i of the trailers between panels of strength Γ; they add up to zero."""
-    span = [(0, 0)] * (gamma.ndim - 1)
-    return jnp.pad(gamma, [(1, 0), *span]) - jnp.pad(gamma, [(0, 1), *span])
+    edge = jnp.zeros_like(gamma[:1])
+    return -jnp.diff(jnp.concatenate([edge, gamma, edge]), axis=0)
 
 
 def tip_share(model: FreeWake, gamma: Float[Array, " R"]) -> Float[Array, " R+1"]:
@@ -64,8 +64,7 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
     points = _along(last_row, _risen(model))
     if settings.roll_up == "impulse":
         stations = jnp.stack([*map(jnp.asarray, inboard), settings.release])
-        strength = _handed_over(trailers(gamma), ramps(model.edges**2, stations**2, beyond=True))
-        return Release(points, jnp.roll(strength, 1))
+        return Release(points, trailers(gamma) @ _weights(model.edges**2, stations**2, beyond=True, first=-1))
     gathered = tip_share(model, gamma) * trailers(gamma)
     strength = jnp.sum(gathered)
     if settings.roll_up == "paper":
@@ -75,7 +74,7 @@ def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array
         points = points.at[0].set((gathered @ last_row) / jnp.sqrt(strength**2 + 1e-16))
     if not inboard:
         return Release(points, strength[None])
-    rest = _handed_over(trailers(gamma) - gathered, ramps(model.edges, jnp.asarray(inboard)))
+    rest = (trailers(gamma) - gathered) @ _weights(model.edges, jnp.asarray(inboard))
     return Release(points, jnp.concatenate([strength[None], rest]))
 
 
@@ -98,13 +97,16 @@ def _along(row: Float[Array, "R+1 3"], risen: Float[Array, "F R"]) -> Float[Arra
     return row[0] + risen @ jnp.diff(row, axis=0)
 
 
-def _handed_over(amounts: Float[Array, " N"], risen: Float[Array, "N G-1"]) -> Float[Array, " G"]:
-    """Share amounts out among G nodes by linear weights; `risen`: how far each lies along the intervals between them.
+def _weights(
+    x: Float[Array, " N"], nodes: Float[Array, " G"], beyond: bool = False, first: int = 0
+) -> Float[Array, "N G"]:
+    """Linear weights that hand each x to its neighbouring nodes; they sum to one over the nodes.
 
-    What goes beyond an interval's start or end is the difference of what lies beyond both.
+    What lies outside all goes to the last node, or with `beyond` to the last two so that Σ weights · nodes is x.
+    first: the node that comes first.
     """
-    beyond = jnp.concatenate([jnp.sum(amounts)[None], amounts @ risen, jnp.zeros(1, amounts.dtype)])
-    return beyond[:-1] - beyond[1:]
+    unit = np.roll(np.eye(nodes.shape[0]), -first, axis=1)
+    return unit[0] + ramps(x, nodes, beyond) @ np.diff(unit, axis=0)
 
 
 def ramps(x: Float[Array, "*n"], nodes: Float[Array, " G"], beyond: bool = False) -> Float[Array, "*n G-1"]:
