@@ -39,10 +39,9 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
     from rotorjax.trim.curve import curve, draw, requests
-    from rotorjax.trim.dispatch import numbers_of
-    from rotorjax.trim.run import Request, table
+    from rotorjax.trim.run import numbers, request, table
 
-    base = Request(
+    base = request(
         rotor=chosen.rotor,
         thrust=chosen.thrust_coefficient,
         inflow=chosen.inflow,
@@ -61,7 +60,7 @@ def run(chosen: argparse.Namespace) -> int:
         check_output(path)
     free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
     results = curve([*wanted, *free])
-    found = [numbers_of(result) for result in results[: len(wanted)]]
+    found = [numbers(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))
     if chosen.json is not None:
         write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})

@@ -42,8 +42,7 @@ from scipy.interpolate import PPoly
 from rotorjax.checks import check_number, closest
 from rotorjax.errors import InputError
 from rotorjax.simulation.history import read_history, smooth
-from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
-from rotorjax.trim.run import Request
+from rotorjax.trim.run import FREE_WAKE, Request, request
 from rotorjax.wake.settings import wake_settings
 
 COLUMNS = (
@@ -143,7 +142,7 @@ def _request(flight: dict[str, Any], folder: Path) -> Request:
         if name not in ("rotor", "inflow"):
             check_number(f"flight.{name}", value)
     values["rotor"] = str(folder / rotor) if rotor.endswith(".toml") else rotor
-    return Request(**values)
+    return request(**values)
 
 
 def _check_keys(data: dict[str, Any]) -> None:

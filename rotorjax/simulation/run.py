@@ -16,7 +16,6 @@ from rotorjax.coupled import Coupled, CoupledState, Outputs, output, rhs
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import ATTITUDE, RotorInputs
 from rotorjax.simulation.case import SimulationCase, steps_of
@@ -114,7 +113,7 @@ def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
     report = progress or (lambda stage: None)
     request = case.request
     if request.height is not None and request.drag_area is None:  # said before the trim's work
-        path_of(case, *catalogue.load(request.rotor), float(np.deg2rad(request.tilt_deg)))
+        path_of(case, request.rotor, request.operating, float(np.deg2rad(request.tilt_deg)))
     report("trim")
     return fly_from(case, start_of(case, report), report)
 

@@ -15,7 +15,7 @@ from rotorjax.simulation.case import COLUMNS, read_case, steps_of
 from rotorjax.simulation.history import piecewise, smooth
 from rotorjax.simulation.run import driver_of
 from rotorjax.simulation.start import from_trim
-from rotorjax.trim.run import Result, prepare
+from rotorjax.trim.run import prepare
 from rotorjax.trim.solve import Trimmed, guess
 
 FLIGHT = '[flight]\nrotor = "uh60"\ninflow = "pitt-peters"\nthrust_coefficient = 0.00575\n'
@@ -76,7 +76,7 @@ def test_histories_are_scipys_monotone_cubics_with_their_rates():
 def started(case):
     """A trim that was not solved for: enough for its inputs."""
     p, flight, residual = prepare(case.request)
-    return from_trim(Result(case.request, p, flight, Trimmed(guess(p, flight), None, residual), 0.0))
+    return from_trim(Trimmed(guess(p, flight), None, residual, flight, p))
 
 
 def test_inputs_of_a_descent(tmp_path):

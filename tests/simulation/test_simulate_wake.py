@@ -29,7 +29,6 @@ from rotorjax.simulation.wake_output import KINDS
 from rotorjax.simulation.wake_pictures import wake_film
 from rotorjax.trim.free_wake import first_guess
 from rotorjax.trim.in_wake import TrimmedInWake, wake_trim
-from rotorjax.trim.in_wake_run import WakeResult
 
 FLIGHT = '[flight]\nrotor = "uh60"\ninflow = "freewake"\nthrust_coefficient = 0.0058\nadvance_ratio = 0.15\n'
 OVER_GROUND = FLIGHT + "height = 1.0\n"
@@ -57,7 +56,7 @@ def start(case):
     settings = settings_of(case)
     p = wake_trim(*catalogue.load("uh60"), rotor_inputs(u=0.15), 0.0058, plane(1.0), settings)
     z = first_guess(p, jnp.array([0.27, 0.04, -0.04]), 0.06, settings.azimuths, 0.03)
-    return from_wake(WakeResult(case.request, TrimmedInWake(z, p, None, 0), 0.0, 0.0))
+    return from_wake(TrimmedInWake(z, p, None, 0))
 
 
 @pytest.fixture(scope="module")
