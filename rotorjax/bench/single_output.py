@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from rotorjax.bench.azimuth import valley_side
 from rotorjax.bench.plotting import (
     MODEL_STYLE,
     across,
@@ -18,7 +19,7 @@ from rotorjax.bench.plotting import (
 )
 from rotorjax.bench.record import inflow_rms_difference
 from rotorjax.bench.settings import StudySettings
-from rotorjax.bench.wake_file import case_of
+from rotorjax.bench.wake_file import case_of, lost_at
 from rotorjax.errors import InputError
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -38,7 +39,7 @@ def check_picture(path: Path | None) -> None:
 def table(data: xr.Dataset, settings: StudySettings, reference: float | None) -> str:
     """Numbers and inflow along the radius as aligned text; inflow over ΩR, induced, positive down."""
     case = case_of(data)
-    lines = [f"{settings.rotor.name}, collective {settings.collective_deg:g} deg, {case.label}", ""]
+    lines = [f"{settings.rotor.name}, collective {settings.collective_deg:g} deg, {title_of(data)}", ""]
     lines += [f"{name:<42}{value}" for name, value in _numbers(data, reference)]
     models = [
         model
@@ -57,6 +58,14 @@ def table(data: xr.Dataset, settings: StudySettings, reference: float | None) ->
     return "\n".join(lines)
 
 
+def title_of(data: xr.Dataset) -> str:
+    """Label of the case whose numbers a data set holds, which is another than asked for where the wake was lost."""
+    label, lost = case_of(data).label, lost_at(data)
+    if lost is not None:
+        return f"{lost} (NOT the case: the wake was lost there, on the way to {label})"
+    return label if bool(data.get("converged", 1)) else f"{label} (not converged)"
+
+
 def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
     """Inflow across the disk and, on a slope, contours of the free wake's loading (or the VPBFSM's inflow)."""
     case, scale = case_of(data), reference or 1.0
@@ -70,7 +79,7 @@ def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
             field = data[name].to_numpy() / scale
             axes.plot(*across(data["radius"].to_numpy(), _along(field, 0), _along(field, 1)), **MODEL_STYLE[model])
         diameter_axes(axes, label, sides=case.slope_deg > 0)
-        axes.set_title(case.label, pad=18 if case.slope_deg else 6)
+        axes.set_title(title_of(data), pad=18 if case.slope_deg else 6)
         legend_below(axes, 3)
         if case.slope_deg:
             wake = "free_wake_inflow" in data
@@ -85,7 +94,7 @@ def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
 
 def _along(field: np.ndarray, side: int | None) -> np.ndarray:
     """Mean over ψ (None), or the mountain (0) or valley (1) side of (K, R)."""
-    return field.mean(axis=0) if side is None else field[side * (field.shape[0] // 2)]
+    return field.mean(axis=0) if side is None else valley_side(field) if side else field[0]
 
 
 def _row(cells: list[str]) -> str:

@@ -62,14 +62,14 @@ def run(chosen: argparse.Namespace) -> int:
         data, reference = single_case(case, settings, chosen.model, progress)
     print(table(data, settings, reference))
     entry = summary_entry(data, reference)
-    if calibration is not None and not changes:
+    if calibration is not None and not changes and "vpbfsm_tau" in data:
         data = apply.add_calibrated(data, settings, calibration)
         print(apply.table(data, reference, calibration))
         entry |= {"calibrated": apply.entry(data, reference, calibration)}
     if chosen.json is not None:
         write_json(chosen.json, entry)
     if chosen.netcdf is not None:
-        netcdf.write(chosen.netcdf, data)
+        netcdf.write(chosen.netcdf, data.set_coords(["height", "slope_deg"]))
     if chosen.plot is not None:
         picture(data, reference, chosen.plot)
     return 0 if bool(data.get("converged", 1)) else 1
