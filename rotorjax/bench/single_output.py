@@ -87,7 +87,7 @@ def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
             psi = data["azimuth" if wake else "station_azimuth"].to_numpy()
             disk = figure.add_subplot(1, 2, 2, projection="polar")
             filled = polar_contour(disk, data["radius"].to_numpy(), psi, field, shared_levels([field]))
-            disk.set_title("free wake" if wake else "VPBFSM", pad=18)
+            disk.set_title("free wake" if wake else "VPBFSM", pad=24)
             figure.colorbar(filled, ax=disk, label=label, shrink=0.8, pad=0.1)
     save_file(figure, path)
 

@@ -1,5 +1,6 @@
 """Where a flight starts: the trim that its case asks for, with any inflow."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from rotorjax.rotor import catalogue, multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import SimulationCase
 from rotorjax.trim import in_wake_run
-from rotorjax.trim.dispatch import check_request
+from rotorjax.trim.dispatch import check_request, numbers_of
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.in_wake_run import WakeResult
 from rotorjax.trim.problem import inputs_at
@@ -27,12 +28,17 @@ from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 
 @dataclass(frozen=True)
 class Start:
-    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad)."""
+    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad).
+
+    CT, CQ: the trim's means over a revolution; NaN where they are not known.
+    """
 
     p: Coupled
     x: CoupledState
     inputs: RotorInputs
     tilt: float
+    CT: float = math.nan
+    CQ: float = math.nan
 
 
 def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None) -> Start:
@@ -51,7 +57,8 @@ def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None
         found = from_trim(result)
     if not result.trimmed.outcome.converged:
         raise InputError(f"[flight] must be a flight that can be trimmed, but: {result.trimmed.outcome.why}")
-    return found
+    means = numbers_of(result)
+    return replace(found, CT=means["CT"], CQ=means["CP"])  # C_Q = C_P
 
 
 def settings_of(case: SimulationCase) -> WakeSettings:

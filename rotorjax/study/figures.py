@@ -211,7 +211,7 @@ def overview(merged: xr.Dataset) -> Figure | None:
     field = merged.sel(case=sloped.name)["free_wake_dct_dr"].to_numpy()
     radius, azimuth = merged["radius"].to_numpy(), merged["azimuth"].to_numpy()
     filled = polar_contour(axes, radius, azimuth, field, shared_levels([field]))
-    axes.set_title(f"{sloped.label}: free wake's loading", pad=18)
+    axes.set_title(f"{sloped.label}: free wake's loading", pad=24)
     figure.colorbar(filled, ax=axes, label=LOADING, shrink=0.75, pad=0.12)
     return figure
 
