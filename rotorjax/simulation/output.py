@@ -148,8 +148,9 @@ def histories(data: xr.Dataset) -> Figure:
         flapping.set(ylabel="flap, deg")
         for name, label, line in (("CT", r"$C_T$", "-"), ("CQ", r"$C_Q$", "--")):
             turned = over_a_turn(data, name)
-            loads.plot(t, turned / turned[0], ls=line, label=f"{label}, trim {turned[0]:.3e}")
-        loads.set(xlabel="time, s", ylabel="mean over the last revolution, over the trim's")
+            (mean,) = loads.plot(t, turned / turned[0], ls=line, label=f"{label}, trim {turned[0]:.3e}")
+            loads.plot(t, data[name] / turned[0], ls=line, lw=0.7, alpha=0.5, color=mean.get_color())
+        loads.set(xlabel="time, s", ylabel="over the trim's (bold: last turn's mean)")
         for name in ("u", "v", "w"):
             if float(abs(data[name]).max()) > 1e-9:
                 motion.plot(t, data[name], label=f"${name}$, m/s")
@@ -159,11 +160,14 @@ def histories(data: xr.Dataset) -> Figure:
         for name in ("roll", "pitch"):
             if float(abs(data[name] - data[name][0]).max()) > 1e-9:
                 motion.plot(t, data[name], ls=(0, (1, 3)), label=f"{name}, deg")
-        motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
+        if float(abs(data["rotor_speed"] - 1).max()) > 1e-9:
+            motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
         if "height" in data:
             motion.plot(t, data["height"], ls="-.", color=plotting.INK, label="height over $R$")
         motion.set(xlabel="time, s", ylabel="hub")
-        for axes in (controls, flapping, loads, motion):
+        if not motion.lines:
+            motion.text(0.5, 0.5, "hub at rest", ha="center", transform=motion.transAxes)
+        for axes in (controls, flapping, loads, *([motion] if motion.lines else [])):
             axes.legend(loc="best", fontsize=8)
     return figure
 
