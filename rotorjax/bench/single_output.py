@@ -1,4 +1,4 @@
-"""One case on the screen and as a picture."""
+"""One case on the screen."""
 
 from pathlib import Path
 
@@ -6,17 +6,6 @@ import numpy as np
 import xarray as xr
 
 from rotorjax.bench.azimuth import valley_side
-from rotorjax.bench.plotting import (
-    MODEL_STYLE,
-    across,
-    diameter_axes,
-    legend_below,
-    new_figure,
-    polar_contour,
-    save_file,
-    shared_levels,
-    style,
-)
 from rotorjax.bench.record import inflow_rms_difference
 from rotorjax.bench.settings import StudySettings
 from rotorjax.bench.wake_file import case_of, lost_at
@@ -52,7 +41,7 @@ def table(data: xr.Dataset, settings: StudySettings, reference: float | None) ->
         "Inflow over ΩR, positive down",
         _row(["r/R", *(f"{FIELDS[m][1]} {s}".strip() for m in models for s in sides)]),
     ]
-    columns = [_along(data[FIELDS[m][0]].to_numpy(), side) for m in models for side in sides.values()]
+    columns = [along(data[FIELDS[m][0]].to_numpy(), side) for m in models for side in sides.values()]
     for i, r in enumerate(data["radius"].to_numpy()):
         lines.append(_row([f"{r:.3f}", *(f"{column[i]:.5f}" for column in columns)]))
     return "\n".join(lines)
@@ -66,33 +55,7 @@ def title_of(data: xr.Dataset) -> str:
     return label if bool(data.get("converged", 1)) else f"{label} (not converged)"
 
 
-def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
-    """Inflow across the disk and, on a slope, contours of the free wake's loading (or the VPBFSM's inflow)."""
-    case, scale = case_of(data), reference or 1.0
-    label = "inflow / mean OGE inflow of the free wake" if reference else "inflow over ΩR"
-    with style():
-        figure = new_figure(10.5 if case.slope_deg else 6.0, 4.0)
-        axes = figure.add_subplot(1, 2 if case.slope_deg else 1, 1)
-        for model, (name, _) in FIELDS.items():
-            if name not in data or (case.height is None and model == "exact_image"):
-                continue
-            field = data[name].to_numpy() / scale
-            axes.plot(*across(data["radius"].to_numpy(), _along(field, 0), _along(field, 1)), **MODEL_STYLE[model])
-        diameter_axes(axes, label, sides=case.slope_deg > 0)
-        axes.set_title(title_of(data), pad=18 if case.slope_deg else 6)
-        legend_below(axes, 3)
-        if case.slope_deg:
-            wake = "free_wake_inflow" in data
-            field = data["free_wake_inflow" if wake else "vpbfsm_inflow"].to_numpy() / scale
-            psi = data["azimuth" if wake else "station_azimuth"].to_numpy()
-            disk = figure.add_subplot(1, 2, 2, projection="polar")
-            filled = polar_contour(disk, data["radius"].to_numpy(), psi, field, shared_levels([field]))
-            disk.set_title("free wake" if wake else "VPBFSM", pad=24)
-            figure.colorbar(filled, ax=disk, label=label, shrink=0.8, pad=0.1)
-    save_file(figure, path)
-
-
-def _along(field: np.ndarray, side: int | None) -> np.ndarray:
+def along(field: np.ndarray, side: int | None) -> np.ndarray:
     """Mean over ψ (None), or the mountain (0) or valley (1) side of (K, R)."""
     return field.mean(axis=0) if side is None else valley_side(field) if side else field[0]
 
