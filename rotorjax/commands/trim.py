@@ -34,11 +34,10 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
-    from rotorjax.bench.plotting import save_file
     from rotorjax.bench.single_output import check_picture
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
-    from rotorjax.trim.curve import curve, draw, requests
+    from rotorjax.trim.curve import curve, requests
     from rotorjax.trim.run import numbers, request, table
 
     base = request(
@@ -65,5 +64,8 @@ def run(chosen: argparse.Namespace) -> int:
     if chosen.json is not None:
         write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
     if chosen.plot is not None:
+        from rotorjax.bench.plotting import save_file  # matplotlib takes half a second to load
+        from rotorjax.trim.curve_picture import draw
+
         save_file(draw(results[: len(wanted)], results[-1] if free else None), chosen.plot)
     return 0 if all(one["converged"] for one in found) else 1

@@ -160,9 +160,12 @@ def _check_keys(data: dict[str, Any]) -> None:
 
 
 def steps_of(case: SimulationCase, omega: float, per_turn: int) -> int:
-    """Number of steps of a march, a multiple of twelve; per_turn: of a revolution. Raises InputError for too many."""
-    turns = case.duration * omega / (2 * np.pi)
-    steps = 12 * max(1, round(turns * per_turn / 12))
+    """Number of steps of a march, its last and shorter twelfth of a turn included; per_turn: of a revolution.
+
+    Raises InputError for too many.
+    """
+    twelfths = case.duration * omega / (2 * np.pi) * 12
+    steps = per_turn // 12 * max(1, int(np.ceil(twelfths * (1 - 1e-12))))
     if steps > _MOST_STEPS:
         raise InputError(f"[time] duration must make at most {_MOST_STEPS} steps, but {case.duration:g} s make {steps}")
     return steps

@@ -1,5 +1,6 @@
 """Where a flight starts: the trim that its case asks for, with any inflow."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,12 +25,17 @@ from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 
 @dataclass(frozen=True)
 class Start:
-    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad)."""
+    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad).
+
+    CT, CQ: the trim's means over a revolution; NaN where they are not known.
+    """
 
     p: Coupled
     x: CoupledState
     inputs: RotorInputs
     tilt: float
+    CT: float = math.nan
+    CQ: float = math.nan
 
 
 def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None) -> Start:
@@ -40,10 +46,12 @@ def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None
             progress(f"{stage}, residual {residual:.1e}")
 
     wake = settings_of(case) if case.request.inflow == FREE_WAKE else None
-    found = run(replace(case.request, wake=wake), progress=show).trimmed
+    result = run(replace(case.request, wake=wake), progress=show)
+    found = result.trimmed
     if not found.outcome.converged:
         raise InputError(f"[flight] must be a flight that can be trimmed, but: {found.outcome.why}")
-    return from_wake(found) if isinstance(found, TrimmedInWake) else from_trim(found)
+    start = from_wake(found) if isinstance(found, TrimmedInWake) else from_trim(found)
+    return replace(start, CT=result.means.CT, CQ=result.means.CQ)
 
 
 def settings_of(case: SimulationCase) -> WakeSettings:

@@ -108,7 +108,7 @@ def test_the_files(folder, flown):
     assert float(data["lag"].sel(coordinate="0")[-1]) > 0.2
     first = data["wake_lattice"].isel(frame=0, blade=0, near_age=0).values
     assert np.hypot(first[-1, 0] - 0.0466, first[-1, 2]) == pytest.approx(1 - 0.0466, abs=1e-4)
-    wake_film(data.isel(frame=slice(0, 2)), over_a_turn(data["CT"].values), folder / "animation.gif")
+    wake_film(data.isel(frame=slice(0, 2)), over_a_turn(data, "CT"), folder / "animation.gif")
     for name in ("histories.png", "wake.png", "animation.gif"):
         assert (folder / name).stat().st_size > 10_000
 
