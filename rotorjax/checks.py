@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Array, ArrayLike
 
 from rotorjax.errors import ArgumentError, InputError
 
@@ -46,6 +48,14 @@ class Range:
 def known(*values: Any) -> bool:
     """Whether everything in some values has a number yet; a traced array has none."""
     return not any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values))
+
+
+def array(value: ArrayLike) -> Array:
+    """A floating-point array of a value; of a number a concrete one, inside of jit too, so that it can be looked at."""
+    if not known(value):
+        return jnp.asarray(value, float)
+    with jax.ensure_compile_time_eval():
+        return jnp.asarray(value, float)
 
 
 def shown(value: object) -> str:

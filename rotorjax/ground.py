@@ -7,9 +7,9 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
-from rotorjax.checks import Range, known, number_of, refuse, shown
+from rotorjax.checks import Range, array, known, number_of, refuse, shown
 
 
 class Plane(eqx.Module):
@@ -63,8 +63,11 @@ def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
     return Plane(ground.height * jnp.cos(ground.slope) / jnp.cos(slope), slope)
 
 
-def plane(height: float, slope_deg: float = 0.0) -> Plane:
-    """Make a ground plane from its height (over R) and slope (degrees); both may be traced.
+def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
+    """Make a ground plane from its height (over R) and slope (degrees); either may be traced by jax.
+
+    >>> float(jax.grad(lambda h: plane(h).distance(jnp.zeros(3)))(1.0))
+    1.0
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
@@ -79,4 +82,4 @@ def plane(height: float, slope_deg: float = 0.0) -> Plane:
         raise refuse(
             "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
         )
-    return Plane(jnp.asarray(height, float), jnp.deg2rad(jnp.asarray(slope_deg, float)))
+    return Plane(array(height), array(math.radians(slope_deg)) if known(slope_deg) else jnp.deg2rad(slope_deg))

@@ -1,10 +1,9 @@
 """The operating point: what the rotor is doing and the air it does it in. SI throughout."""
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, check_range
+from rotorjax.checks import Range, array, check_range
 
 RANGES = {
     "omega": Range(0.0, 21_000.0, "rad/s", above=True, hint="a clockwise rotor has its sense in `rotation`"),
@@ -69,4 +68,4 @@ def operating_point(
     }
     for name, value in fields.items():
         check_range(name, value, RANGES[name])
-    return OperatingPoint(**{name: jnp.asarray(value, float) for name, value in fields.items()})
+    return OperatingPoint(**{name: array(value) for name, value in fields.items()})

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, check_list, check_range, known
+from rotorjax.checks import Range, array, check_list, check_range, known
 from rotorjax.errors import InputError
 
 # The rule is used as it stands to M = 0.7; above, its Mach number levels off towards 0.85 so that it stays finite
@@ -108,7 +108,7 @@ def airfoil_table(
     # −π and π are the wrap's own ends; deg2rad may miss them by a rounding.
     alpha[0], alpha[-1] = -np.pi, np.pi
     nodes = xp.stack([_with_slopes(alpha, mach, c, xp) for c in (cl, cd)], axis=2)
-    return AirfoilTable(name, bool(prandtl_glauert), *(jnp.asarray(x, float) for x in (alpha, mach, nodes)))
+    return AirfoilTable(name, bool(prandtl_glauert), *map(array, (alpha, mach, nodes)))
 
 
 def linear_airfoil(slope: float = 2 * np.pi, cd: float = 0.0, zero_lift: float = 0.0) -> AirfoilTable:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, check_number, check_range, check_stations, check_whole, known, refuse, shown
+from rotorjax.checks import Range, array, check_number, check_range, check_stations, check_whole, known, refuse, shown
 from rotorjax.rotor.airfoil import AirfoilTable
 
 ROTATIONS = ("counter-clockwise", "clockwise")
@@ -158,9 +158,9 @@ def rotor(
     return Rotor(
         name=name,
         blades=blades,
-        radius=jnp.asarray(radius, float),
-        root_cutout=jnp.asarray(root_cutout, float),
-        tip_loss=jnp.asarray(tip_loss, float),
+        radius=array(radius),
+        root_cutout=array(root_cutout),
+        tip_loss=array(tip_loss),
         airfoil=airfoil,
         hinge=hinge,
         rotation=rotation,
@@ -203,9 +203,9 @@ def hinge(
         *(flap_spring, lag_spring, damper_arm),
     )
     return Hinge(
-        *(jnp.asarray(value, float) for value in scalars),
-        damper_rate=None if rate is None else jnp.asarray(rate),
-        damper_force=None if force is None else jnp.asarray(force),
+        *map(array, scalars),
+        damper_rate=None if rate is None else array(rate),
+        damper_force=None if force is None else array(force),
     )
 
 
@@ -238,4 +238,4 @@ def _table(name: str, value: Any, first: Any, allowed: Range) -> Table:
         number = check_range(name, value, allowed)
         stations = np.array([first, 1.0]) if known(first) else jnp.stack([first, jnp.ones_like(first)])
         values = np.full(2, float(number)) if known(number) else jnp.stack([number, number])
-    return Table(jnp.asarray(stations, float), jnp.asarray(values, float))
+    return Table(array(stations), array(values))

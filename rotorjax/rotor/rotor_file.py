@@ -19,11 +19,11 @@ import numpy as np
 from rotorjax.checks import Range
 from rotorjax.errors import InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
-from rotorjax.limits import check_rotor
 from rotorjax.operating import OperatingPoint, operating_point
 from rotorjax.rotor import geometry
 from rotorjax.rotor.airfoil import AirfoilTable, airfoil_table
 from rotorjax.rotor.airfoil_io import Section, read_columns, read_section
+from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.full_range import FLAT_PLATE, completed
 from rotorjax.rotor.geometry import ROTATIONS
 

@@ -17,12 +17,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from rotorjax.checks import known
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.limits import check_rotor
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import geometry
+from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, wake_settings
 
@@ -167,7 +167,7 @@ def free_wake(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
             f"but has {settings.azimuths}"
         )
-    return FreeWake(rotor, operating, ground, settings, jnp.zeros(()))
+    return FreeWake(rotor, operating, ground, settings, array(0.0))
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:

@@ -10,7 +10,7 @@ from rotorjax.rotor.airfoil import lift_drag
 
 
 def test_names():
-    assert catalogue.names() == ("caradonna_tung", "elliott_althoff", "uh60")
+    assert catalogue.names() == ("caradonna_tung", "elliott_althoff", "knight_hefner_2", "knight_hefner_4", "uh60")
 
 
 def test_uh60_is_the_papers_table_1():
@@ -52,6 +52,16 @@ def test_elliott_althoff_flies_at_its_reported_advance_ratio():
     np.testing.assert_allclose(28.50 / point.tip_speed(rotor.radius), 0.15, atol=5e-4)
     twist = geometry.twist(rotor, jnp.array([0.0, 0.75, 1.0]))
     np.testing.assert_allclose(jnp.rad2deg(twist), [6, 0, -2], atol=1e-12)
+
+
+def test_knight_and_hefners_section_has_the_reported_lift_slope_and_least_drag():
+    table = catalogue.load("knight_hefner_2")[0].airfoil
+    angle = jnp.deg2rad(jnp.linspace(0.0, 6.0, 25))
+    lift, drag = lift_drag(table, angle, jnp.zeros_like(angle))
+    assert float(jnp.sum(angle * lift) / jnp.sum(angle**2)) == pytest.approx(5.75, rel=0.03)
+    assert float(jnp.min(drag)) == pytest.approx(0.0113, abs=2e-4)
+    highest = jnp.max(lift_drag(table, jnp.deg2rad(jnp.linspace(6.0, 16.0, 81)), jnp.zeros(81))[0])
+    assert float(highest) == pytest.approx(0.93, abs=0.02)
 
 
 OWN = """
@@ -138,7 +148,7 @@ def test_own_file_refuses(folder, old, new, message):
     ("name", "message"),
     [
         ("uh-60", "must be a rotor of the catalogue or a .toml file, but is 'uh-60': did you mean 'uh60'?"),
-        ("xyzzy", "it must be one of caradonna_tung, elliott_althoff, uh60"),
+        ("xyzzy", "it must be one of caradonna_tung, elliott_althoff, knight_hefner_2, knight_hefner_4, uh60"),
         (None, "but is None"),
     ],
 )
