@@ -118,7 +118,7 @@ def solidity(rotor: Rotor) -> Float[Array, ""]:
     if known(s, c, radius):  # numbers need nothing compiled
         s, c, radius = (np.asarray(v) for v in (s, c, radius))
     inside = 0.5 * (c[1:] + c[:-1]) @ (s[1:] - s[:-1])
-    return jnp.asarray(rotor.blades / np.pi * (inside + c[0] * s[0] + c[-1] * (1 - s[-1])) / radius)
+    return array(rotor.blades / np.pi * (inside + c[0] * s[0] + c[-1] * (1 - s[-1])) / radius)
 
 
 def rotor(

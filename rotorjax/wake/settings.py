@@ -4,11 +4,10 @@ from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, check_number, check_range, check_whole, known, shown
+from rotorjax.checks import Range, array, check_number, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
 
 _USUAL_AZIMUTHS = 8
@@ -166,7 +165,7 @@ def wake_settings(
         azimuths,
         tuple(inboard),
         roll_up,
-        *(jnp.asarray(v, float) for v in numbers),
+        *map(array, numbers),
     )
     _check_counts(settings)
     _check_roll_up(settings)
