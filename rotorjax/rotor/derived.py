@@ -74,7 +74,7 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
     if found.solidity > MOST_SOLIDITY:
         raise InputError(
             f"The solidity (blade area over disk area) must be at most {MOST_SOLIDITY:g}, but is {found.solidity:.3g}: "
-            f"check chord (up to {float(rotor.chord.values.max()):g} m) against radius ({float(rotor.radius):g} m)"
+            f"check chord (up to {np.asarray(rotor.chord.values).max():g} m) against radius ({float(rotor.radius):g} m)"
         )
     if found.tip_mach > MOST_TIP_MACH:
         rpm, radius = float(operating.omega) * 9.549297, float(rotor.radius)
@@ -82,7 +82,7 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
             f"The tip Mach number must be at most {MOST_TIP_MACH:g}, but is {found.tip_mach:.3g}: check rpm ({rpm:g}) "
             f"and radius ({radius:g} m)"
         )
-    last = float(rotor.airfoil.mach[-1])
+    last = float(np.asarray(rotor.airfoil.mach)[-1])
     if found.tip_mach > last + _TABLE_END:
         raise InputError(
             f"The tip Mach number must lie within the airfoil's table, which ends at {last:g}, but is "

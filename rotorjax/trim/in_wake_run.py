@@ -32,6 +32,7 @@ class WakeResult:
 
 def check_in_wake(request: trim_run.Request) -> None:
     """Raise InputError where something of a request is not allowed."""
+    trim_run.check(request)
     trim_run.prepare(replace(request, inflow="vpbfsm"))
 
 
@@ -90,6 +91,6 @@ def wake_numbers(result: WakeResult) -> dict[str, Any]:
         "CP_damper": flown.CP_damper,
         "hub_roll_moment": -float(flown.moment[0]),
         "hub_pitch_moment": float(flown.moment[1]),
-        "figure_of_merit": float(flown.CT**1.5 / np.sqrt(2) / flown.CQ) if request.advance == 0 else None,
+        "figure_of_merit": trim_run.figure_of_merit(flown.CT, flown.CQ, request),
         "wall_time_s": result.wall_time_s,
     }

@@ -12,6 +12,7 @@ from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.inflow.choice import inflow_model
+from rotorjax.limits import check_flight, check_place
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import solidity
 from rotorjax.trim.problem import Aim, Flight, Trim, TrimResidual, cyclic, outputs_at
@@ -59,7 +60,10 @@ def check(request: Request) -> None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
         )
-    check_number("tilt", request.tilt_deg, -40.0, 40.0)
+    check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
+    check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
+    check_flight(request.inflow, request.thrust, request.climb, request.advance)
+    check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
     if request.height is not None and request.climb:
@@ -72,6 +76,11 @@ def prepare(request: Request) -> tuple[CoupledRotor, Flight, TrimResidual]:
     """Rotor, flight and equations of a request. Raises InputError where something of it is not allowed."""
     check(request)
     rotor, operating = catalogue.load(request.rotor)
+    if float(operating.climb):
+        raise InputError(
+            f"[operating] climb must be 0 in a rotor file that is trimmed, but is {float(operating.climb):g} m/s, "
+            "which has no effect: give the climb to the trim"
+        )
     ground = None if request.height is None else plane(request.height, request.slope_deg)
     p = coupled_rotor(rotor, operating, inflow_model(request.inflow, ground))
     area = np.pi * float(rotor.radius) ** 2
@@ -136,9 +145,15 @@ def numbers(result: Result) -> dict[str, Any]:
         "CP_damper": mean(out.CP_damper),
         "hub_roll_moment": -float(moment[0]),
         "hub_pitch_moment": float(moment[1]),
-        "figure_of_merit": float(thrust**1.5 / np.sqrt(2) / power) if result.request.advance == 0 else None,
+        "figure_of_merit": figure_of_merit(thrust, power, result.request),
         "wall_time_s": result.wall_time_s,
     }
+
+
+def figure_of_merit(thrust: float, power: float, request: Request) -> float | None:
+    """C_T^1.5/(√2 C_P), of a hover that takes power; it means nothing in flight, climb or descent."""
+    hovers = request.advance == 0 and request.climb == 0 and thrust > 0 and power > 0
+    return float(thrust**1.5 / np.sqrt(2) / power) if hovers else None
 
 
 def table(found: dict[str, Any]) -> str:
