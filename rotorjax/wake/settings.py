@@ -1,15 +1,16 @@
 """How a free wake is discretised and closed: one frozen object, each choice with its reason."""
 
+from dataclasses import replace
 from typing import Any, Literal, get_args
 
 import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number
+from rotorjax.checks import Range, array, check_number, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
 
+_USUAL_AZIMUTHS = 8
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
 
 
@@ -21,7 +22,8 @@ class WakeSettings(eqx.Module):
         age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
             are free to move; closure_turns: further turns that repeat the last free one, one by one;
             closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py).
-        azimuths: K, slices of the periodic wake where it is not axisymmetric (a multiple of the number of blades).
+        azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; None
+            for eight or the next such multiple, which `for_blades` writes in.
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
         roll_up: strength of the tip vortex and where it leaves the last row of the near wake (roll_up.py).
@@ -66,7 +68,7 @@ class WakeSettings(eqx.Module):
     free_turns: float = eqx.field(static=True)
     closure_turns: int = eqx.field(static=True)
     closure_bundles: int = eqx.field(static=True)
-    azimuths: int = eqx.field(static=True)
+    azimuths: int | None = eqx.field(static=True)
     inboard: tuple[float, ...] = eqx.field(static=True)
     roll_up: RollUp = eqx.field(static=True)
     release: Float[Array, ""]
@@ -84,6 +86,10 @@ class WakeSettings(eqx.Module):
     impulse_kept: Float[Array, ""]
     stall_chords: Float[Array, ""]
     circulation_lag: Float[Array, ""]
+
+    def for_blades(self, blades: int) -> "WakeSettings":
+        """These settings with a number of azimuths that suits a rotor, where none was asked for."""
+        return self if self.azimuths is not None else replace(self, azimuths=blades * -(-_USUAL_AZIMUTHS // blades))
 
     @property
     def age_step(self) -> float:
@@ -123,7 +129,7 @@ def wake_settings(
     free_turns: float = 2.0,
     closure_turns: int = 2,
     closure_bundles: int = 5,
-    azimuths: int = 8,
+    azimuths: int | None = None,
     inboard: tuple[float, ...] = (0.45, 0.8),
     roll_up: RollUp = "impulse",
     release: float = 0.971,
@@ -159,7 +165,7 @@ def wake_settings(
         azimuths,
         tuple(inboard),
         roll_up,
-        *(jnp.asarray(v, float) for v in numbers),
+        *map(array, numbers),
     )
     _check_counts(settings)
     _check_roll_up(settings)
@@ -167,23 +173,25 @@ def wake_settings(
     check_number("release_band", release_band, 0.0, 0.1)
     check_number("impulse_kept", impulse_kept, 0.0, 1.0)
     for name in _POSITIVE:
-        check_number(name, float(getattr(settings, name)), 0.0, open_=True)
+        check_range(name, getattr(settings, name), Range(0.0, 1e3, above=True))
     for name in ("turbulence", "inboard_decay", "control_chords"):
-        check_number(name, float(getattr(settings, name)), 0.0)
+        check_range(name, getattr(settings, name), Range(0.0, 1e3))
     return settings
 
 
 _POSITIVE = ("sharpness", "tip_core", "inboard_core", "near_core", "control_core", "bound_core_chords")
+_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
 _POSITIVE += ("self_induction_core", "circulation_lag", "stall_chords")
 
 
 def _check_counts(settings: WakeSettings) -> None:
     """Raise InputError where a number of panels, ages or turns does not work out."""
-    for name, least in (("panels", 4), ("closure_turns", 0), ("closure_bundles", 0), ("azimuths", 1)):
-        value = getattr(settings, name)
-        if value < least or value != int(value):
-            raise InputError(f"Argument `{name}` must be a whole number of at least {least}, but is {value}")
-    step = settings.age_step_deg
+    for name, least, most in _COUNTS:
+        if (value := getattr(settings, name)) is not None:
+            check_whole(name, value, least, most)
+    step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
+    check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
+    check_range("free_turns", settings.free_turns, Range(0.1, 50.0))
     steps = 360 / step if step > 0 else 0.5
     if abs(steps - round(steps)) > 1e-9 or steps < 12:
         raise InputError(
@@ -207,10 +215,11 @@ def _check_roll_up(settings: WakeSettings) -> None:
     """Raise InputError where the rule is unknown, or the inboard filaments do not fit it."""
     inboard, roll_up = settings.inboard, settings.roll_up
     if roll_up not in get_args(RollUp):
-        raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {roll_up!r}")
-    if roll_up == "impulse" and (not inboard or inboard[-1] >= float(settings.release)):
+        raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {shown(roll_up)}")
+    release = float(settings.release) if known(settings.release) else 1.0
+    if roll_up == "impulse" and (not inboard or inboard[-1] >= release):
         raise InputError(
-            f"Argument `inboard` must hold stations below `release` ({float(settings.release):g}) for roll_up "
+            f"Argument `inboard` must hold stations below `release` ({release:g}) for roll_up "
             f"'impulse', but is {inboard}: move them inboard, or use 'paper' for a tip vortex alone"
         )
     if any(not 0 < r < 1 for r in inboard) or list(inboard) != sorted(set(inboard)):
