@@ -14,8 +14,8 @@ from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
 from rotorjax.inflow.choice import NAMES, inflow_model
-from rotorjax.operating import OperatingPoint
 from rotorjax.limits import check_flight, check_place
+from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor, solidity
