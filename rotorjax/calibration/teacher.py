@@ -27,7 +27,7 @@ from rotorjax.io import netcdf
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import FiniteStateModel, disk_inflow, finite_state_model
 
-FAR = 30.0  # a stand-in height where there is no ground; its effect is masked
+FAR = 1e4  # a stand-in height where there is no ground; its effect is masked
 
 
 class Lessons(eqx.Module):

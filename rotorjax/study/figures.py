@@ -54,14 +54,14 @@ def profile(data: xr.Dataset, model: str, reference: float, azimuth: int = 0) ->
         return data["radius"].to_numpy(), data["free_wake_inflow"].to_numpy()[azimuth] / reference
     if model == "vpbfsm":
         return data["grid_radius"].to_numpy(), data["vpbfsm_inflow_grid"].to_numpy()[azimuth] / reference
-    return data["grid_radius"].to_numpy(), data["exact_image_inflow_diameter"].to_numpy()[azimuth] / reference
+    return data["grid_radius"].to_numpy(), data[f"{model}_inflow_diameter"].to_numpy()[azimuth] / reference
 
 
 def across_disk(data: xr.Dataset, model: str, reference: float) -> tuple[np.ndarray, np.ndarray]:
     """Normalised inflow of a model from the valley's tip over the hub to the mountain's."""
-    opposite = {"free_wake": data.sizes["azimuth"] // 2, "vpbfsm": data.sizes["grid_azimuth"] // 2, "exact_image": 1}
+    opposite = {"free_wake": data.sizes["azimuth"] // 2, "vpbfsm": data.sizes["grid_azimuth"] // 2}
     r, mountain = profile(data, model, reference)
-    _, valley = profile(data, model, reference, opposite[model])
+    _, valley = profile(data, model, reference, opposite.get(model, 1))
     return across(r, mountain, valley)
 
 
@@ -122,7 +122,7 @@ def inflow_of(case: Case, title: str) -> Draw:
             return None
         figure = new_figure()
         axes = figure.add_subplot()
-        for model in ("free_wake", "vpbfsm") + (("exact_image",) if case.height is not None else ()):
+        for model in ("free_wake", "vpbfsm", "printed") + (("exact_image",) if case.height is not None else ()):
             look = dict(MODEL_STYLE[model])
             if case.height is None and model == "vpbfsm":
                 look["label"] = "VPBFSM, three pressure terms"

@@ -4,10 +4,21 @@ from collections.abc import Sequence
 
 from rotorjax.errors import InputError
 from rotorjax.rotor.rotor_file import closest
-from rotorjax.validation import caradonna_tung, grid, ground, heave, inflow_map, landgrebe, march, momentum, step
+from rotorjax.validation import (
+    caradonna_tung,
+    finite_state,
+    grid,
+    ground,
+    heave,
+    inflow_map,
+    landgrebe,
+    march,
+    momentum,
+    step,
+)
 from rotorjax.validation.case import Subject, ValidationCase
 
-_ALL = (caradonna_tung, momentum, landgrebe, ground, step, march, heave, inflow_map, grid)
+_ALL = (caradonna_tung, momentum, landgrebe, ground, finite_state, step, march, heave, inflow_map, grid)
 CASES = {module.CASE.name: module.CASE for module in _ALL}
 MEASURED = (caradonna_tung.NAME, inflow_map.NAME)
 QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)

@@ -12,7 +12,7 @@ from rotorjax.wake.model import FreeWake, free_wake
 
 @dataclass(frozen=True)
 class Point:
-    """One wake in hover. rotor: name or file. collective_deg. height: over R, None out of ground effect.
+    """One wake in hover. rotor: name or file. collective_deg. height: over R, None out of ground effect. slope_deg.
 
     changes: settings of the wake that differ from the default, as (name, value).
     """
@@ -21,11 +21,13 @@ class Point:
     collective_deg: float
     height: float | None = None
     changes: tuple[tuple[str, Any], ...] = ()
+    slope_deg: float = 0.0
 
     @property
     def label(self) -> str:
         """Name for readers."""
         place = "OGE" if self.height is None else f"h = {self.height:g}"
+        place += f", δ = {self.slope_deg:g}°" if self.slope_deg else ""
         more = "".join(f", {name} {value:g}" for name, value in self.changes)
         return f"{self.rotor} {self.collective_deg:g}°, {place}{more}"
 
@@ -36,7 +38,7 @@ class Point:
     def model(self, quick: bool) -> FreeWake:
         """The free wake to solve. Raises InputError where a setting is not allowed."""
         settings = self.settings(quick)
-        ground = None if self.height is None else plane(self.height)
+        ground = None if self.height is None else plane(self.height, self.slope_deg)
         return free_wake(settings.rotor, settings.operating, ground, settings.wake)
 
 
@@ -50,11 +52,12 @@ def point(rotor: str, collective_deg: float | None = None, height: float | None 
 def needed(task: Point, tasks: Sequence[Point]) -> Point | None:
     """The wake that `task` starts from: among those before it with its rotor and settings, the nearest."""
     before = [p for p in tasks[: tasks.index(task)] if p.rotor == task.rotor and p.changes == task.changes]
-    before = [p for p in before if p.height is None or (task.height is not None and p.height > task.height)]
+    before = [p for p in before if p.height is None or (task.height is not None and p.height >= task.height)]
+    before = [p for p in before if p.height != task.height or p.slope_deg < task.slope_deg or p.height is None]
 
-    def distance(p: Point) -> tuple[float, float]:
+    def distance(p: Point) -> tuple[float, float, float]:
         far = 10.0 if p.height is None and task.height is not None else abs((p.height or 0) - (task.height or 0))
-        return abs(p.collective_deg - task.collective_deg), far
+        return abs(p.collective_deg - task.collective_deg), far, abs(p.slope_deg - task.slope_deg)
 
     return min(before, key=distance, default=None)
 
