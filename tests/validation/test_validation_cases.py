@@ -111,6 +111,13 @@ def test_a_straight_path_has_its_pitch():
 def test_no_ground_is_infinitely_far(coarse_hover):
     assert clearance(coarse_hover) == np.inf
     assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
+    assert ground.power_ratio(coarse_hover, coarse_hover) == 1
+
+
+def test_the_power_ratio_is_that_at_constant_thrust(coarse_hover):
+    """Twice the thrust with 2^1.5 times 0.8 of the induced power is a rotor that needs 0.8 of it at the same thrust."""
+    near = replace(coarse_hover, CT=2 * coarse_hover.CT, CP_induced=0.8 * 2**1.5 * coarse_hover.CP_induced)
+    assert ground.power_ratio(near, coarse_hover) == pytest.approx(0.8)
 
 
 def test_inflow_over_the_disk_is_less_than_at_the_blades_and_has_converged_in_azimuth(coarse_hover):
