@@ -1,9 +1,14 @@
 """Checks on concrete values at constructors: one line that names the argument, the rule and the value."""
 
+import difflib
 import math
+from collections.abc import Iterable
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
+from jaxtyping import Array, ArrayLike
 
 from rotorjax.errors import InputError
 
@@ -13,6 +18,19 @@ def refuse(name: str, rule: str, shown: str) -> InputError:
     return InputError(f"Argument `{name}` must {rule}, but is {shown}")
 
 
+def known(*values: object) -> bool:
+    """Whether values are numbers yet: traced ones (grad, vmap, jit) are not, and pass every check."""
+    return not any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(values))
+
+
+def array(value: ArrayLike) -> Array:
+    """A floating-point array of a value; of a number a concrete one, inside of jit too, so that it can be looked at."""
+    if not known(value):
+        return jnp.asarray(value, float)
+    with jax.ensure_compile_time_eval():
+        return jnp.asarray(value, float)
+
+
 def check_number(
     name: str, value: object, lowest: float = -math.inf, highest: float = math.inf, *, open_: bool = False
 ):
@@ -20,7 +38,7 @@ def check_number(
 
     A traced value has no number yet and passes, so that constructors may be differentiated through.
     """
-    if isinstance(value, Tracer):
+    if not known(value):
         return value
     rule = f"be {_range_in_words(lowest, highest, open_)}"
     if isinstance(value, bool | str) or value is None or np.ndim(value) != 0:  # type: ignore[arg-type]
@@ -32,6 +50,13 @@ def check_number(
     if not math.isfinite(number) or not lowest <= number <= highest or (open_ and number == lowest):
         raise refuse(name, rule, f"{number:g}")
     return value
+
+
+def closest(word: str, allowed: Iterable[str]) -> str:
+    """`Did you mean …?` where something allowed is close, else the list of what is allowed."""
+    allowed = list(allowed)
+    near = difflib.get_close_matches(word, allowed, n=1)
+    return f"did you mean '{near[0]}'?" if near else "it must be one of " + ", ".join(allowed)
 
 
 def check_stations(name: str, stations: object, values: object, first: float, last: float):

@@ -7,8 +7,9 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 
 
@@ -63,19 +64,21 @@ def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
     return Plane(ground.height * jnp.cos(ground.slope) / jnp.cos(slope), slope)
 
 
-def plane(height: float, slope_deg: float = 0.0) -> Plane:
-    """Make a ground plane from its height (over R) and slope (degrees).
+def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
+    """Make a ground plane from its height (over R) and slope (degrees); either may be traced by jax.
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
+
+    >>> float(jax.grad(lambda h: plane(h).distance(jnp.zeros(3)))(1.0))
+    1.0
     """
-    if not (math.isfinite(height) and height > 0):
+    if known(height) and not (math.isfinite(height) and height > 0):  # type: ignore[arg-type, operator]
         raise InputError(f"Argument `height` must be positive and finite (hub above ground, over R), but is {height}")
-    if not 0 <= slope_deg < 60:
+    if known(slope_deg) and not 0 <= slope_deg < 60:  # type: ignore[operator]
         raise InputError(f"Argument `slope_deg` must lie in [0, 60) degrees, but is {slope_deg}")
-    clearance = math.tan(math.radians(slope_deg))
-    if height <= clearance:
+    if known(height, slope_deg) and height <= (lowest := math.tan(math.radians(slope_deg))):  # type: ignore
         raise InputError(
-            f"Argument `height` must exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground, "
+            f"Argument `height` must exceed tan({slope_deg} deg) = {lowest:.3f}, where the disk cuts the ground, "
             f"but is {height}"
         )
-    return Plane(jnp.asarray(height, float), jnp.deg2rad(jnp.asarray(slope_deg, float)))
+    return Plane(array(height), array(jnp.deg2rad(slope_deg) if not known(slope_deg) else math.radians(slope_deg)))

@@ -1,10 +1,9 @@
 """The operating point: what the rotor is doing and the air it does it in. SI throughout."""
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number
+from rotorjax.checks import array, check_number
 
 
 class OperatingPoint(eqx.Module):
@@ -53,4 +52,4 @@ def operating_point(
     check_number("collective", collective, -1.5708, 1.5708)
     check_number("climb", climb)
     fields = (omega, density, sound_speed, viscosity, collective, climb)
-    return OperatingPoint(*(jnp.asarray(value, float) for value in fields))
+    return OperatingPoint(*map(array, fields))

@@ -4,6 +4,7 @@ One colour belongs to each model throughout (Okabe and Ito's palette, told apart
 height or slope run along a perceptually uniform map. Drawing needs no display and changes no global setting.
 """
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rotorjax.io.atomic import whole_file
+from rotorjax.io.atomic import write_bytes
 
 FREE_WAKE, VPBFSM, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#009E73", "#222222"
 MODEL_STYLE: dict[str, dict[str, Any]] = {
@@ -70,9 +71,12 @@ def save(figure: Figure, stem: str | Path, formats: Sequence[str] = ("png", "pdf
 
 def save_file(figure: Figure, path: str | Path) -> None:
     """Write one whole picture, its format from the name's ending; the same picture gives the same file."""
-    metadata = {"CreationDate": None} if Path(path).suffix == ".pdf" else {}
-    with style(), whole_file(path) as temporary:
-        figure.savefig(temporary, metadata=metadata)
+    ending = Path(path).suffix.lower().removeprefix(".")
+    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending, {})
+    file = io.BytesIO()
+    with style():
+        figure.savefig(file, format=ending, metadata=metadata)
+    write_bytes(path, file.getvalue())
 
 
 def series_colours(count: int) -> list[Any]:

@@ -8,9 +8,9 @@ import xarray as xr
 
 from rotorjax.bench import finite_state
 from rotorjax.bench.finite_state import FiniteStateResult, Stations
+from rotorjax.bench.flapping import RIGID, flap_harmonics_deg
 from rotorjax.bench.settings import StudySettings
 from rotorjax.bench.wake_file import case_of, is_sound
-from rotorjax.study.flapping import RIGID, flap_harmonics_deg
 
 COMPARED = (0.25, 0.95)  # radii over R between which the distributions are compared
 

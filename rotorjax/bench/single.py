@@ -1,19 +1,31 @@
 """One case with the VPBFSM, the free wake or both, as `rotorjax inflow` asks for it."""
 
 import time
-from typing import Literal
+from collections.abc import Callable
+from typing import Literal, Protocol
 
 import jax
 import numpy as np
 import xarray as xr
 
 from rotorjax.bench import finite_state, wake_file
-from rotorjax.bench.cases import Case
-from rotorjax.bench.record import variables_of
+from rotorjax.bench.cases import Case, neighbour
+from rotorjax.bench.record import add_finite_state, variables_of
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
-from rotorjax.study.run import Progress, Solver, solve_case
-from rotorjax.wake.solution import solve
+from rotorjax.wake.model import FreeWake
+from rotorjax.wake.solution import Solution, solve
+
+Progress = Callable[[str, float], None]
+
+
+class Solver(Protocol):
+    """What solves the free wake: rotorjax.wake.solution.solve."""
+
+    def __call__(self, model: FreeWake, start: Solution | None, progress: Progress | None) -> Solution:
+        """Return the periodic wake of `model`."""
+        ...
+
 
 Model = Literal["vpbfsm", "freewake", "both"]
 
@@ -39,13 +51,27 @@ def single_case(
     check_case(case, settings)
     if model == "vpbfsm":
         return _finite_state_alone(case, settings), None
-    data = solve_case(case, settings, {}, progress, solver)
+    data = wake_file.to_dataset(case, solve_wake(case, settings, {}, progress, solver), settings)
+    data = add_finite_state(data, settings)
     if model == "freewake":
         return data, None
     if case.height is None:
         return data, float(data["free_wake_mean_inflow"])
     free = solver(wake_file.model_of(Case(), settings), None, progress)
     return data, float(free.mean_inflow) - settings.climb_ratio
+
+
+def solve_wake(
+    case: Case,
+    settings: StudySettings,
+    done: dict[Case, xr.Dataset],
+    progress: Progress | None = None,
+    solver: Solver = solve,
+) -> Solution:
+    """The free wake of a case with rigid blades, from its nearest converged neighbour among `done` if there is one."""
+    near = neighbour(case, [other for other, data in done.items() if bool(data["converged"])])
+    start = None if near is None else wake_file.to_solution(done[near], settings)
+    return solver(wake_file.model_of(case, settings), start, progress)
 
 
 def _finite_state_alone(case: Case, settings: StudySettings) -> xr.Dataset:

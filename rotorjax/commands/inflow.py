@@ -42,7 +42,7 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.calibration import apply
     from rotorjax.calibration.calibration_file import load
     from rotorjax.io import netcdf
-    from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.io.atomic import check_output, write_json
 
     case = case_of(chosen)
     calibration = None if chosen.calibration is None else load(chosen.calibration)
@@ -53,8 +53,7 @@ def run(chosen: argparse.Namespace) -> int:
     check_case(case, settings)
     check_picture(chosen.plot)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
-        if path is not None:  # before the work, not after it
-            make_folder(path.parent)
+        check_output(path)  # before the work, not after it
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
 
         def progress(stage: str, residual: float) -> None:

@@ -24,7 +24,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     add_rotor(parser)
     add_harmonics(parser)
     add_calibration(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, kept="; finished cases are kept, and the same command continues")
 
 
 def run(chosen: argparse.Namespace) -> int:

@@ -37,7 +37,7 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.bench.plotting import save_file
     from rotorjax.bench.single_output import check_picture
     from rotorjax.errors import InputError
-    from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.io.atomic import check_output, write_json
     from rotorjax.trim.curve import curve, draw, requests
     from rotorjax.trim.dispatch import numbers_of
     from rotorjax.trim.run import Request, table
@@ -58,8 +58,7 @@ def run(chosen: argparse.Namespace) -> int:
     if chosen.plot is not None and len(wanted) == 1:
         raise InputError("Argument `plot` must come with several speeds or heights, but there is one point")
     for path in (chosen.json, chosen.plot):
-        if path is not None:
-            make_folder(path.parent)
+        check_output(path)
     free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
     results = curve([*wanted, *free])
     found = [numbers_of(result) for result in results[: len(wanted)]]

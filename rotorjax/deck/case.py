@@ -38,13 +38,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from rotorjax.checks import check_number
+from rotorjax.checks import check_number, closest
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.moving_ground import Variant, require_clear, require_increasing
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.rotor.rotor_file import closest
 
 _KEYS = {
     "rotor": {"name": "uh60", "collective_deg": None, "rigid": None},

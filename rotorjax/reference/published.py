@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
-
-from rotorjax.calibration.hayden import hayden_factor
+from jaxtyping import Array, Float
 
 MASS = 0.849
 """Apparent mass of an impermeable disk over ρπR³, 8/(3π)."""
@@ -104,6 +102,11 @@ def landgrebe(age: Float[np.ndarray, " A"], thrust: float, solidity: float, twis
 def landgrebe_pitch(thrust: float, twist_deg: float) -> float:
     """Landgrebe's k₂: change of z over R a radian beyond the first blade passage, −(1.41 + 0.0141 θ_tw) √(C_T/2)."""
     return float(-(1.41 + 0.0141 * twist_deg) * np.sqrt(thrust / 2))
+
+
+def hayden_factor(height: Float[Array, "*N"]) -> Float[Array, "*N"]:
+    """Return Hayden's k_G of heights over R: induced power over that out of ground effect at the same thrust, ≤ 1."""
+    return jnp.minimum(1 / (0.9926 + 0.0379 * (2 / height) ** 2), 1.0)
 
 
 def isolated_rotors(height: float) -> float | None:

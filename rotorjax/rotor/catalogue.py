@@ -7,10 +7,11 @@ rotor, operating = load("my_rotor.toml")
 from importlib import resources
 from pathlib import Path
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.rotor.rotor_file import closest, read_rotor
+from rotorjax.rotor.rotor_file import read_rotor
 
 
 def names() -> tuple[str, ...]:

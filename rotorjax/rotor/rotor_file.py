@@ -4,14 +4,13 @@ A user's own file works as the catalogue's do: rotorjax/rotor/data/uh60.toml sho
 to it. Every mistake is refused in one line that names the file, the key, the value and what is allowed.
 """
 
-import difflib
 import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint, operating_point
 from rotorjax.rotor import airfoil_io, geometry
@@ -74,13 +73,6 @@ def read_rotor(path: str | Path) -> tuple[geometry.Rotor, OperatingPoint]:
         return _build(data, path.parent)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def closest(word: str, allowed: Iterable[str]) -> str:
-    """`Did you mean …?` where something allowed is close, else the list of what is allowed."""
-    allowed = list(allowed)
-    near = difflib.get_close_matches(word, allowed, n=1)
-    return f"did you mean '{near[0]}'?" if near else "it must be one of " + ", ".join(allowed)
 
 
 def _parse(path: Path) -> dict[str, Any]:

@@ -39,9 +39,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PPoly
 
-from rotorjax.checks import check_number
+from rotorjax.checks import check_number, closest
 from rotorjax.errors import InputError
-from rotorjax.rotor.rotor_file import closest
 from rotorjax.simulation.history import read_history, smooth
 from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
 from rotorjax.trim.run import Request

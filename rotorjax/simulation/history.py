@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.interpolate import PchipInterpolator, PPoly
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
-from rotorjax.rotor.rotor_file import closest
 
 
 class Piecewise(eqx.Module):

@@ -11,11 +11,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
+from rotorjax.bench.film import write_film
 from rotorjax.coupled import inflow_velocity, stations
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import ATTITUDE
-from rotorjax.simulation.film import write_film
 from rotorjax.simulation.ground_view import ground_arrays, ground_line
 from rotorjax.simulation.run import SAVES, Simulated
 from rotorjax.simulation.wake_output import wake_arrays

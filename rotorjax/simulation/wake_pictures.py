@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
-from rotorjax.simulation.film import write_film
+from rotorjax.bench.film import write_film
 from rotorjax.simulation.ground_view import ground_line
 
 _VIEWS = {"from above": (0, 1), "from the side": (0, 2)}

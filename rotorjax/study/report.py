@@ -10,11 +10,11 @@ import xarray as xr
 
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import present
+from rotorjax.bench.flapping import flap_harmonics_deg
 from rotorjax.bench.markdown import table
 from rotorjax.study.claim import Claim
 from rotorjax.study.claims import checks, paper_claims
 from rotorjax.study.divergence import where_they_part
-from rotorjax.study.flapping import flap_harmonics_deg
 from rotorjax.study.reading import Reading
 
 TABLE_R = (0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.95)

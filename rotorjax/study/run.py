@@ -1,36 +1,26 @@
 """The study itself: solve the cases in order, keep each as it finishes, then write pictures, tables and report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from json import loads
 from pathlib import Path
 from threading import Thread
-from typing import Protocol
 
 import xarray as xr
 from tqdm import tqdm
 
 from rotorjax.bench import wake_file
 from rotorjax.bench.cases import Case, neighbour
+from rotorjax.bench.flapping import flapping_dataset
 from rotorjax.bench.record import add_finite_state
 from rotorjax.bench.schedule import Schedule
 from rotorjax.bench.settings import StudySettings, differences
+from rotorjax.bench.single import Progress, Solver, solve_wake
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder
-from rotorjax.study.flapping import with_flapping
-from rotorjax.wake.model import FreeWake
-from rotorjax.wake.solution import Solution, rehearse, solve
-
-Progress = Callable[[str, float], None]
-
-
-class Solver(Protocol):
-    """What solves the free wake: rotorjax.wake.solution.solve."""
-
-    def __call__(self, model: FreeWake, start: Solution | None, progress: Progress | None) -> Solution:
-        """Return the periodic wake of `model`."""
-        ...
+from rotorjax.trim.held import let_flap
+from rotorjax.wake.solution import rehearse, solve
 
 
 @dataclass(frozen=True)
@@ -104,13 +94,12 @@ def solve_case(
     solver: Solver = solve,
 ) -> xr.Dataset:
     """Solve one case with both models, from its nearest converged neighbour among `done` where there is one."""
-    near = neighbour(case, [other for other, data in done.items() if bool(data["converged"])])
-    start = None if near is None else wake_file.to_solution(done[near], settings)
-    solution = solver(wake_file.model_of(case, settings), start, progress)
-    if settings.flapping:
-        data = with_flapping(case, solution, settings, progress)
+    rigid = solve_wake(case, settings, done, progress, solver)
+    if settings.flapping and rigid.converged:
+        freed = let_flap(rigid, progress)
+        data = flapping_dataset(case, rigid, freed.solution, freed.flap, settings)
     else:
-        data = wake_file.to_dataset(case, solution, settings)
+        data = wake_file.to_dataset(case, rigid, settings)
     return add_finite_state(data, settings)
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from tqdm import tqdm
 
 from rotorjax.bench import plotting
-from rotorjax.calibration.hayden import hayden_factor
 from rotorjax.errors import InputError
+from rotorjax.reference.published import hayden_factor
 from rotorjax.trim.dispatch import check_request, numbers_of, trim_request
 from rotorjax.trim.in_wake_run import WakeResult
 from rotorjax.trim.run import Request, Result

@@ -2,9 +2,9 @@
 
 from typing import Any
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
 from rotorjax.inflow.choice import NAMES
-from rotorjax.rotor.rotor_file import closest
 from rotorjax.trim import in_wake_run, run
 from rotorjax.trim.in_wake import Progress
 from rotorjax.trim.in_wake_run import WakeResult

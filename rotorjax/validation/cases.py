@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
-from rotorjax.rotor.rotor_file import closest
 from rotorjax.validation import (
     caradonna_tung,
     grid,

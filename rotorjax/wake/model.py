@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
@@ -153,7 +154,7 @@ def free_wake(
     Raises InputError where the rotor climbs over ground, or azimuths is no multiple of the number of blades.
     """
     settings = wake_settings() if settings is None else settings
-    if ground is not None and float(operating.climb) != 0:
+    if ground is not None and known(operating.climb) and float(operating.climb) != 0:
         raise InputError(
             f"Argument `operating` must not climb over ground (a steady state needs a fixed height), "
             f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
@@ -163,7 +164,7 @@ def free_wake(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
             f"but has {settings.azimuths}"
         )
-    return FreeWake(rotor, operating, ground, settings, jnp.zeros(()))
+    return FreeWake(rotor, operating, ground, settings, array(0.0))
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:
