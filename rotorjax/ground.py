@@ -81,4 +81,5 @@ def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
             f"Argument `height` must exceed tan({slope_deg} deg) = {lowest:.3f}, where the disk cuts the ground, "
             f"but is {height}"
         )
-    return Plane(array(height), array(jnp.deg2rad(slope_deg) if not known(slope_deg) else math.radians(slope_deg)))
+    slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
+    return Plane(array(height), array(slope))

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from rotorjax.bench.cases import Case
@@ -182,6 +181,8 @@ def _self_consistent(start, model, rotor, operating, stations):
 
     def residual(tau, _):
         return _pressure(disk_loading(rotor, blade(tau)), stations, model) - tau
+
+    import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
 
     found = optx.root_find(residual, optx.Newton(rtol=1e-10, atol=1e-12), start, max_steps=50, throw=False)
     total = coefficients_of(rotor, blade(found.value), stations.r, stations.widths)

@@ -42,8 +42,7 @@ from scipy.interpolate import PPoly
 from rotorjax.checks import check_number, closest
 from rotorjax.errors import InputError
 from rotorjax.simulation.history import read_history, smooth
-from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
-from rotorjax.trim.run import Request
+from rotorjax.trim.run import FREE_WAKE, Request, request
 from rotorjax.wake.settings import wake_settings
 
 COLUMNS = (
@@ -143,7 +142,7 @@ def _request(flight: dict[str, Any], folder: Path) -> Request:
         if name not in ("rotor", "inflow"):
             check_number(f"flight.{name}", value)
     values["rotor"] = str(folder / rotor) if rotor.endswith(".toml") else rotor
-    return Request(**values)
+    return request(**values)
 
 
 def _check_keys(data: dict[str, Any]) -> None:
@@ -161,9 +160,12 @@ def _check_keys(data: dict[str, Any]) -> None:
 
 
 def steps_of(case: SimulationCase, omega: float, per_turn: int) -> int:
-    """Number of steps of a march, a multiple of twelve; per_turn: of a revolution. Raises InputError for too many."""
-    turns = case.duration * omega / (2 * np.pi)
-    steps = 12 * max(1, round(turns * per_turn / 12))
+    """Number of steps of a march, its last and shorter twelfth of a turn included; per_turn: of a revolution.
+
+    Raises InputError for too many.
+    """
+    twelfths = case.duration * omega / (2 * np.pi) * 12
+    steps = per_turn // 12 * max(1, int(np.ceil(twelfths * (1 - 1e-12))))
     if steps > _MOST_STEPS:
         raise InputError(f"[time] duration must make at most {_MOST_STEPS} steps, but {case.duration:g} s make {steps}")
     return steps
