@@ -9,8 +9,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from rotorjax.checks import array, known
-from rotorjax.errors import InputError
+from rotorjax.checks import Range, array, known, number_of, refuse, shown
 
 
 class Plane(eqx.Module):
@@ -67,19 +66,21 @@ def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
 def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
     """Make a ground plane from its height (over R) and slope (degrees); either may be traced by jax.
 
-    Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
-
     >>> float(jax.grad(lambda h: plane(h).distance(jnp.zeros(3)))(1.0))
     1.0
+
+    Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
-    if known(height) and not (math.isfinite(height) and height > 0):  # type: ignore[arg-type, operator]
-        raise InputError(f"Argument `height` must be positive and finite (hub above ground, over R), but is {height}")
-    if known(slope_deg) and not 0 <= slope_deg < 60:  # type: ignore[operator]
-        raise InputError(f"Argument `slope_deg` must lie in [0, 60) degrees, but is {slope_deg}")
-    if known(height, slope_deg) and height <= (lowest := math.tan(math.radians(slope_deg))):  # type: ignore
-        raise InputError(
-            f"Argument `height` must exceed tan({slope_deg} deg) = {lowest:.3f}, where the disk cuts the ground, "
-            f"but is {height}"
+    if number_of(height) not in Range(0.0, above=True) and known(height):
+        found = f"{height}" if isinstance(height, int | float) else shown(height)
+        raise refuse("height", "be positive and finite (hub above ground, over R)", found)
+    if known(slope_deg) and not 0 <= number_of(slope_deg) < 60:
+        found = f"{slope_deg}" if isinstance(slope_deg, int | float) else shown(slope_deg)
+        raise refuse("slope_deg", "lie in [0, 60) degrees", found)
+    if known(height, slope_deg) and height <= math.tan(math.radians(slope_deg)):
+        clearance = math.tan(math.radians(slope_deg))
+        raise refuse(
+            "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
         )
     slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
     return Plane(array(height), array(slope))

@@ -13,6 +13,7 @@ FLOORS = (  # from the ground up; a room may import from lower floors, and from 
     ("ground", "region", "operating", "ode"),
     ("rotor", "potential"),
     ("inflow", "wake", "reference"),
+    ("limits",),
     ("coupled_wake", "coupled"),
     ("bench",),
     ("trim", "linearisation", "calibration", "simulation", "deck"),

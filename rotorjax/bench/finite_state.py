@@ -4,7 +4,7 @@ All that a case needs is evaluated at once, in one compiled function that every 
 evaluation of the Legendre functions costs seconds of compilation and microseconds of work.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,6 +14,8 @@ from jaxtyping import Array, Float
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
+from rotorjax.inflow.momentum import VORTEX_RING
+from rotorjax.limits import check_axial, check_flight
 from rotorjax.potential import loading, rigid_cylinder
 from rotorjax.potential.ground_source import DiskQuadrature, correlation
 from rotorjax.potential.model import (
@@ -112,12 +114,32 @@ def steady_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[
     return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
 
 
+def axial_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
+    """Steady states in any axial flight that momentum theory knows; a thrust down is one up, upside down.
+
+    In the windmill brake state, out of ground effect, the air goes up with V_T = −(V_c + v) and V̄ = −(V_c + 2v); else
+    `steady_state`. Its mass flows in hover, V and 2V, tell which of the two carries a mode.
+    """
+    thrust = loading.thrust_coefficient(tau, model.modes)
+    sign = jnp.where(thrust < 0, -1.0, 1.0)
+    tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
+    windmill = climb <= VORTEX_RING[0] * hover
+    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb))
+    if model.ground is None:
+        inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
+        through, varying = inner - climb / 2, 2 * inner
+        first = mass_flow_parameters(model, tau) < 1.5 * hover
+        braked = tau / jnp.where(first, through, varying)
+        state = FiniteState(jnp.where(windmill, braked, state.a), state.c)
+    return FiniteState(sign * state.a, sign * state.c)
+
+
 @eqx.filter_jit
 def evaluate(
     model: FiniteStateModel, tau: Float[Array, " M"], stations: Stations, climb: Float[Array, ""]
 ) -> FiniteStateResult:
     """Steady states of a loading and all fields of `FiniteStateResult`."""
-    state = steady_state(model, tau, climb)
+    state = axial_state(model, tau, climb)
     x, y, nu, weights = (jnp.asarray(v, tau.dtype) for v in model.quadrature.rule())
     area = 2 * nu * weights  # r dr = −ν dν
     grid_r, grid_psi, sides = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI, DIAMETER_PSI))
@@ -160,13 +182,16 @@ def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Rotor
         jnp.asarray(2 * np.pi / ALONE_AZIMUTHS * np.arange(ALONE_AZIMUTHS)),
     )
     model = model_of(case, settings)
-    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * 0.005)
+    guess = check_axial("vpbfsm", settings.rotor, settings.operating)
+    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * guess)
     tau, converged, total = _self_consistent(start, model, settings.rotor, settings.operating, stations)
-    if not (bool(converged) and float(loading.thrust_coefficient(tau, model.modes)) > 0):
+    thrust = float(loading.thrust_coefficient(tau, model.modes))
+    if not (bool(converged) and thrust * guess > 0):
         raise InputError(
             f"Argument `collective` must give a loading that thrusts upward, but at {settings.collective_deg:g} deg "
-            "no steady one was found"
+            f"no steady one was found (residual tolerance {_tolerance(tau.dtype):.0e})"
         )
+    check_flight("vpbfsm", thrust, settings.climb_ratio)
     return evaluate(model, tau, stations, jnp.asarray(settings.climb_ratio)), total, stations
 
 
@@ -176,7 +201,7 @@ def _self_consistent(start, model, rotor, operating, stations):
 
     def blade(tau) -> SectionLoads:
         x, y = _polar(stations.r, stations.psi)
-        down = disk_inflow(steady_state(model, tau, climb), x, y, model) + climb
+        down = disk_inflow(axial_state(model, tau, climb), x, y, model) + climb
         return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
 
     def residual(tau, _):
@@ -184,9 +209,15 @@ def _self_consistent(start, model, rotor, operating, stations):
 
     import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
 
-    found = optx.root_find(residual, optx.Newton(rtol=1e-10, atol=1e-12), start, max_steps=50, throw=False)
+    rtol = _tolerance(start.dtype)
+    found = optx.root_find(residual, optx.Newton(rtol=rtol, atol=rtol / 100), start, max_steps=50, throw=False)
     total = coefficients_of(rotor, blade(found.value), stations.r, stations.widths)
     return found.value, found.result == optx.RESULTS.successful, total
+
+
+def _tolerance(dtype: Any) -> float:
+    """Relative change of the pressure terms at which they count as found: 1e-10, or single precision's rounding."""
+    return 1e-10 if jnp.finfo(dtype).bits == 64 else 2e-5
 
 
 @eqx.filter_jit

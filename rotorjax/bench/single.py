@@ -13,6 +13,7 @@ from rotorjax.bench.cases import Case, neighbour
 from rotorjax.bench.record import add_finite_state, variables_of
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
+from rotorjax.limits import check_axial, check_place
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.solution import Solution, solve
 
@@ -30,9 +31,12 @@ class Solver(Protocol):
 Model = Literal["vpbfsm", "freewake", "both"]
 
 
-def check_case(case: Case, settings: StudySettings) -> None:
-    """Raise InputError where the disk would cut the ground, or the rotor climbs over it."""
+def check_case(case: Case, settings: StudySettings, model: Model = "freewake") -> None:
+    """Raise InputError where the disk would cut the ground, the rotor climbs over it, or a model is not for that."""
     _ = case.ground
+    for name in ("vpbfsm", "freewake") if model == "both" else (model,):
+        check_place(name, case.height, case.slope_deg)
+        check_axial(name, settings.rotor, settings.operating)
     if case.height is not None and settings.climb_ratio:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), "
@@ -48,7 +52,7 @@ def single_case(
     "vpbfsm" takes the blade loads of its own inflow; "freewake" its own; "both" drives the VPBFSM with the free wake's
     loads and solves out of ground effect too, for the reference. Raises InputError where the case is not allowed.
     """
-    check_case(case, settings)
+    check_case(case, settings, model)
     if model == "vpbfsm":
         return _finite_state_alone(case, settings), None
     data = wake_file.to_dataset(case, solve_wake(case, settings, {}, progress, solver), settings)

@@ -51,7 +51,7 @@ def run(chosen: argparse.Namespace) -> int:
     settings = study_settings(
         chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, flapping=False, **changes
     )
-    check_case(case, settings)
+    check_case(case, settings, chosen.model)
     check_picture(chosen.plot)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
         check_output(path)  # before the work, not after it

@@ -14,6 +14,7 @@ from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
 from rotorjax.inflow.choice import NAMES, inflow_model
+from rotorjax.limits import check_flight, check_place
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.flap_lag import blade_of
@@ -97,12 +98,20 @@ def check(request: Request) -> None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
         )
-    check_number("tilt", request.tilt_deg, -40.0, 40.0)
+    check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
+    check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
+    check_flight(request.inflow, request.thrust, request.climb, request.advance)
+    check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
     if request.height is not None and request.climb:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), but is {request.climb:g}"
+        )
+    if float(request.operating.climb):
+        raise InputError(
+            f"[operating] climb must be 0 in a rotor file that is trimmed, but is {float(request.operating.climb):g} "
+            "m/s, which has no effect: give the climb to the trim"
         )
     blade_of(request.rotor, request.operating)
     _ = request.flight, request.ground
@@ -174,9 +183,15 @@ def numbers(result: Result) -> dict[str, Any]:
         "CP_damper": flown.CP_damper,
         "hub_roll_moment": -float(flown.moment[0]),
         "hub_pitch_moment": float(flown.moment[1]),
-        "figure_of_merit": float(flown.CT**1.5 / np.sqrt(2) / flown.CQ) if request.advance == 0 else None,
+        "figure_of_merit": figure_of_merit(flown.CT, flown.CQ, request),
         "wall_time_s": result.wall_time_s,
     }
+
+
+def figure_of_merit(thrust: float, power: float, request: Request) -> float | None:
+    """C_T^1.5/(√2 C_P), of a hover that takes power; it means nothing in flight, climb or descent."""
+    hovers = request.advance == 0 and request.climb == 0 and thrust > 0 and power > 0
+    return float(thrust**1.5 / np.sqrt(2) / power) if hovers else None
 
 
 def table(found: dict[str, Any]) -> str:

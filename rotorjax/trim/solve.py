@@ -53,7 +53,7 @@ def flight(
     """
     check_number("thrust_coefficient", thrust, 0.0, open_=True)
     check_number("advance_ratio", advance, 0.0, 0.5)
-    check_number("climb", climb, -0.05, 0.2)
+    check_number("climb", climb, -0.3, 0.2)
     check_number("tilt", tilt, -0.7, 0.7)
     check_number("drag_area", drag_area, 0.0, 0.2)
     if height is not None:

@@ -56,12 +56,16 @@ CHANGES = {
     r"\[parameters\] must hold mean_gain": ('set = "hayden"', 'set = "freewake"'),
     "must hold b, p, but holds b, q": ("p = ", "q = "),
     "must hold b, p, but holds b, q, p": ("p = ", "q = 1.0\np = "),
-    r"`b` must lie in \[0.001, 1\], but is 5": ("b = 0.0917", "b = 5.0"),
-    "`b` must be a finite number, but is nan": ("b = 0.0917", "b = nan"),
-    "`b` must be a finite number, but is 'x'": ("b = 0.0917", 'b = "x"'),
-    "lacks converged": ("converged = true\n", ""),
-    "must hold .calibration. and .parameters.": ("[parameters]", "[parametres]"),
-    "cannot be read": ("[parameters]", "[parameters"),
+    r"\[parameters\] b must be a number in \[0.001, 1\], but is 5": ("b = 0.0917", "b = 5.0"),
+    r"\[parameters\] b must be a finite number, but is nan": ("b = 0.0917", "b = nan"),
+    r"\[parameters\] b must be a finite number, but is 'x'": ("b = 0.0917", 'b = "x"'),
+    "must have the key 'converged'": ("converged = true\n", ""),
+    "did you mean 'parameters'": ("[parameters]", "[parametres]"),
+    "must be TOML, but is not": ("[parameters]", "[parameters"),
+    "converged must be true or false, but is 'no'": ("converged = true", 'converged = "no"'),
+    r"rms_error must be a finite number of at least 0, but is nan": ("rms_error = 0.00355", "rms_error = nan"),
+    r"\[foo\] is not a known table": ("[parameters]", "[foo]\nx = 1\n[parameters]"),
+    r"set must be text in quotes, but is \['hayden'\]": ('set = "hayden"', 'set = ["hayden"]'),
 }
 
 

@@ -150,7 +150,7 @@ def test_a_path_into_the_ground_is_refused(tmp_path):
         (FLIGHT + TIME + "[histroy]\n", "history"),
         (FLIGHT + TIME + HISTORY + "colective_deg = [0, 0, 0, 0]\n", "collective_deg"),
         (FLIGHT + TIME + HISTORY + "w = [0, 0, 0]\n", "as many values"),
-        (FLIGHT + TIME + HISTORY + "w = [0, nan, 0, 0]\n", "gap.*entry 2"),
+        (FLIGHT + TIME + HISTORY + "w = [0, nan, 0, 0]\n", "w must be .* throughout, but is nan at entry 2"),
         (FLIGHT + TIME + HISTORY.replace("0.3", "0.2"), "increase"),
         (FLIGHT + TIME + HISTORY.replace("0.5]", "0.4]"), "duration"),
         (FLIGHT + TIME + HISTORY + "rotor_speed = [100, 10, 100, 100]\n", "rotor_speed"),
