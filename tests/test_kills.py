@@ -1,7 +1,7 @@
 """Killed at any moment, alone or with another run in the same folder, a study loses no finished case.
 
-The wakes are made up and written slowly, so that kills hit waits and writes. `ROTORJAX_KILLS=30 pytest tests/test_kills.py`
-kills as often as one likes.
+The wakes are made up and written slowly, so that kills hit waits and writes; as often as one likes with
+`ROTORJAX_KILLS=30 pytest tests/test_kills.py`.
 """
 
 import os
