@@ -131,12 +131,13 @@ def _flapping_entry(data: xr.Dataset) -> dict[str, Any]:
 
 def _free_wake_entry(data: xr.Dataset) -> dict[str, Any]:
     return {
-        **_loads_entry(data),
+        **_numbers(data, "CT", "CP_induced"),
         "mean_inflow": float(data["free_wake_mean_inflow"]),
         "residual": float(data["free_wake_residual"]),
         "converged": bool(data["converged"]),
-        "lost_at": lost_at(data),
         "ground_normal_velocity_rms": float(data["free_wake_ground_normal_velocity_rms"]),
+        **_numbers(data, "CP", "CP_profile"),
+        "lost_at": lost_at(data),
     }
 
 
@@ -146,9 +147,9 @@ def _finite_state_entry(data: xr.Dataset) -> dict[str, Any]:
         "ground_normal_velocity_rms": float(data["vpbfsm_ground_normal_velocity_rms"]),
     }
     if "free_wake_inflow" not in data:  # its own blade loads: what the free wake's entry holds otherwise
-        entry |= _loads_entry(data)
+        entry |= _numbers(data, "CT", "CP_induced", "CP", "CP_profile")
     return entry
 
 
-def _loads_entry(data: xr.Dataset) -> dict[str, float]:
-    return {name: float(data[name]) for name in ("CT", "CP", "CP_induced", "CP_profile")}
+def _numbers(data: xr.Dataset, *names: str) -> dict[str, float]:
+    return {name: float(data[name]) for name in names}
