@@ -2,8 +2,8 @@
 
 import argparse
 import os
-import platform
 import sys
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -11,7 +11,9 @@ from typing import NoReturn
 from rotorjax import __version__
 from rotorjax.errors import InputError
 
-DIVERGED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+DIVERGED, BAD_INPUT, FAULT, INTERRUPTED, CLOSED = 1, 2, 70, 130, 141
+# XLA's older way to write fused loops: the same sums in the same time, and half to compile (benchmarks/xla_flags.py)
+XLA_FLAGS = "--xla_cpu_use_fusion_emitters=false"
 
 
 class Parser(argparse.ArgumentParser):
@@ -36,45 +38,105 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and return its exit code: 0, 1 where a case did not converge, 2 for bad input."""
-    chosen = parser().parse_args(arguments)
-    _set_up_jax()
+    """Run a command and return its exit code.
+
+    0; 1 where a case did not converge; 2 for bad input, a full disk included; 70 for a fault of rotorjax itself; 130
+    when interrupted; 141 where nobody reads what is printed any more.
+    """
+    chosen = parsed(sys.argv[1:] if arguments is None else arguments)
+    programs = None
     try:
+        programs = _set_up_jax()
         return chosen.run(chosen)
     except InputError as error:
-        print(f"rotorjax {chosen.command}: error: {' '.join(str(error).split())}", file=sys.stderr)
-        return BAD_INPUT
+        return _left(chosen, BAD_INPUT, f"error: {' '.join(str(error).split())}")
     except KeyboardInterrupt:
-        print(f"\nrotorjax {chosen.command}: interrupted; finished cases are kept", file=sys.stderr)
-        return INTERRUPTED
+        return _left(chosen, INTERRUPTED, "interrupted" + getattr(chosen, "kept", ""))
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what Python still flushes at its end
+        return CLOSED
+    except Exception as error:
+        return _left(chosen, FAULT, _fault(error))
+    finally:
+        if programs is not None:
+            from rotorjax.io import program_cache
+
+            program_cache.seal(programs, settled=0.0)
 
 
-def program_cache() -> Path:
-    """Folder of compiled programs, so that a command's second run need not compile: safe to delete at any time.
+def parsed(arguments: Sequence[str]) -> argparse.Namespace:
+    """The parsed arguments; leaves with exit code 2 where they are wrong."""
+    top = parser()
+    for given in arguments:
+        if given.startswith("--") and given.endswith("=--"):  # argparse would take the value for no value at all
+            top.error(f"argument {given.removesuffix('=--')}: expected a value, but it is '--'")
+    return top.parse_args(arguments)
 
-    One for each machine, since programs are made for its processor and home folders are shared.
-    """
-    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(caches) / "rotorjax" / (platform.node() or "programs")
+
+def _left(chosen: argparse.Namespace, code: int, message: str) -> int:
+    print(f"{os.linesep if code == INTERRUPTED else ''}rotorjax {chosen.command}: {message}", file=sys.stderr)
+    return code
 
 
-def _set_up_jax() -> None:
-    """Double precision, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR or the caller says where.
+def _fault(error: Exception) -> str:
+    """One line on an exception that nobody expected, its traceback before it if ROTORJAX_TRACEBACK is set."""
+    if os.environ.get("ROTORJAX_TRACEBACK"):
+        traceback.print_exception(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    reason = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    return (
+        f"internal error: {reason} ({Path(place.filename).name}:{place.lineno}); a fault of rotorjax, not of your "
+        "input: please report it with the command, its files and what ROTORJAX_TRACEBACK=1 shows"
+    )
 
-    For each program that it takes from there XLA prints that this processor lacks "prefer-no-gather", which is no
-    feature of processors but a hint of its own; its real errors come as exceptions.
+
+def _set_up_jax() -> Path | None:
+    """Double precision, quick compilation, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR says where.
+
+    Returns the folder of programs where it is ours. For each program that it takes from there XLA prints that this
+    processor lacks "prefer-no-gather", which is no feature of processors but a hint of its own; its real errors come as
+    exceptions.
     """
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # read when jax is imported
+    if "jax" not in sys.modules:
+        os.environ["XLA_FLAGS"] = f"{XLA_FLAGS} {os.environ.get('XLA_FLAGS', '')}".strip()  # the user's own come last
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    if jax.config.values["jax_compilation_cache_dir"] is None:
-        jax.config.update("jax_compilation_cache_dir", str(program_cache()))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    if jax.config.values["jax_compilation_cache_dir"] is not None:
+        return None
+    return _keep_programs()
+
+
+def _keep_programs() -> Path | None:
+    import warnings
+
+    import jax
+
+    from rotorjax.io import program_cache
+
+    folder = program_cache.opened()
+    if folder is not None:
+        jax.config.update("jax_compilation_cache_dir", str(folder))
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+        jax.monitoring.register_event_listener(lambda event, **_: _seal_earlier(event, folder))
+        warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")  # it compiles instead
+    return folder
+
+
+def _seal_earlier(event: str, folder: Path) -> None:
+    """Seal the programs that were kept before this one, so that a killed run loses the last alone."""
+    if event == "/jax/compilation_cache/cache_misses":
+        from rotorjax.io import program_cache
+
+        program_cache.seal(folder)
 
 
 def script() -> NoReturn:
     """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit."""
+    from rotorjax.io import terminal
+
+    terminal.make_safe()
     code = main()
     if code == INTERRUPTED:
         sys.stdout.flush()

@@ -7,9 +7,14 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
-from rotorjax.errors import InputError
+from rotorjax.checks import Range, array, known, number_of, refuse, shown
+
+
+def component(vectors: Float[Array, "*n 3"], unit: Float[Array, "3"]) -> Float[Array, "*n"]:
+    """Component of vectors along a unit vector; as a sum of products it is part of the loop that reads it."""
+    return jnp.sum(vectors * unit, axis=-1)
 
 
 class Plane(eqx.Module):
@@ -33,7 +38,7 @@ class Plane(eqx.Module):
 
     def distance(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
         """Height of points above the plane along its normal, over R."""
-        return points @ self.normal + self.height * jnp.cos(self.slope)
+        return component(points, self.normal) + self.height * jnp.cos(self.slope)
 
     def reflect_points(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
         """Mirror images of points."""
@@ -41,7 +46,7 @@ class Plane(eqx.Module):
 
     def reflect_vectors(self, vectors: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
         """Mirror images of vectors: the component along the normal changes sign."""
-        return vectors - 2 * (vectors @ self.normal)[..., None] * self.normal
+        return vectors - 2 * component(vectors, self.normal)[..., None] * self.normal
 
 
 class TurnedPlane(Plane):
@@ -63,19 +68,24 @@ def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
     return Plane(ground.height * jnp.cos(ground.slope) / jnp.cos(slope), slope)
 
 
-def plane(height: float, slope_deg: float = 0.0) -> Plane:
-    """Make a ground plane from its height (over R) and slope (degrees).
+def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
+    """Make a ground plane from its height (over R) and slope (degrees); either may be traced by jax.
+
+    >>> float(jax.grad(lambda h: plane(h).distance(jnp.zeros(3)))(1.0))
+    1.0
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
-    if not (math.isfinite(height) and height > 0):
-        raise InputError(f"Argument `height` must be positive and finite (hub above ground, over R), but is {height}")
-    if not 0 <= slope_deg < 60:
-        raise InputError(f"Argument `slope_deg` must lie in [0, 60) degrees, but is {slope_deg}")
-    clearance = math.tan(math.radians(slope_deg))
-    if height <= clearance:
-        raise InputError(
-            f"Argument `height` must exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground, "
-            f"but is {height}"
+    if number_of(height) not in Range(0.0, above=True) and known(height):
+        found = f"{height}" if isinstance(height, int | float) else shown(height)
+        raise refuse("height", "be positive and finite (hub above ground, over R)", found)
+    if known(slope_deg) and not 0 <= number_of(slope_deg) < 60:
+        found = f"{slope_deg}" if isinstance(slope_deg, int | float) else shown(slope_deg)
+        raise refuse("slope_deg", "lie in [0, 60) degrees", found)
+    if known(height, slope_deg) and height <= math.tan(math.radians(slope_deg)):
+        clearance = math.tan(math.radians(slope_deg))
+        raise refuse(
+            "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
         )
-    return Plane(jnp.asarray(height, float), jnp.deg2rad(jnp.asarray(slope_deg, float)))
+    slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
+    return Plane(array(height), array(slope))

@@ -1,10 +1,19 @@
 """The operating point: what the rotor is doing and the air it does it in. SI throughout."""
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number
+from rotorjax.checks import Range, array, check_range
+
+RANGES = {
+    "omega": Range(0.0, 21_000.0, "rad/s", above=True, hint="a clockwise rotor has its sense in `rotation`"),
+    "density": Range(1e-3, 2000.0, "kg/m3"),
+    "sound_speed": Range(100.0, 3000.0, "m/s"),
+    "viscosity": Range(1e-8, 0.1, "m2/s"),
+    "collective": Range(-0.7854, 0.7854, "rad", hint="degrees go through np.deg2rad"),
+    "climb": Range(-200.0, 200.0, "m/s"),
+}
+"""What each field may be, beyond which a rotor is another machine or the unit another one."""
 
 
 class OperatingPoint(eqx.Module):
@@ -45,12 +54,18 @@ def operating_point(
     """Make an operating point in SI units; the air defaults to the ISA at sea level (ISO 2533).
 
     omega in rad/s, density in kg/m³, sound_speed in m/s, viscosity (kinematic) in m²/s, collective in rad, climb in
-    m/s. Raises InputError where a value is not finite, omega, density, sound_speed or viscosity is not positive, or the
-    collective exceeds ±π/2 (degrees given for radians).
+    m/s; all may be traced. Raises InputError where a value is not finite or not one that a rotor can have: omega in
+    (0, 21 000], density in [1e-3, 2000], sound_speed in [100, 3000], viscosity in [1e-8, 0.1], the collective within
+    ±π/4, the climb within ±200 m/s.
     """
-    for name, value in {"omega": omega, "density": density, "sound_speed": sound_speed, "viscosity": viscosity}.items():
-        check_number(name, value, 0.0, open_=True)
-    check_number("collective", collective, -1.5708, 1.5708)
-    check_number("climb", climb)
-    fields = (omega, density, sound_speed, viscosity, collective, climb)
-    return OperatingPoint(*(jnp.asarray(value, float) for value in fields))
+    fields = {
+        "omega": omega,
+        "density": density,
+        "sound_speed": sound_speed,
+        "viscosity": viscosity,
+        "collective": collective,
+        "climb": climb,
+    }
+    for name, value in fields.items():
+        check_range(name, value, RANGES[name])
+    return OperatingPoint(**{name: array(value) for name, value in fields.items()})

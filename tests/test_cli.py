@@ -64,7 +64,7 @@ def test_an_interrupt_leaves_whole_files_and_code_130(tmp_path, solver, capsys):
 
     solver(interrupted)
     assert main(["study", "--out", str(tmp_path), "--quick"]) == 130
-    assert "finished cases are kept" in capsys.readouterr().err
+    assert "finished cases are kept, and the same command continues" in capsys.readouterr().err
     for path in (tmp_path / "cases").iterdir():
         netcdf.read(path)
 
@@ -110,12 +110,26 @@ BAD = {
     "inflow --plot a.doc": "but is 'a.doc'",
     "inflow --model other": "invalid choice: 'other'",
     "inflow --height x": "invalid float value: 'x'",
+    "linearise --out {tmp} --order=--": "argument --order: expected a value",
+    "study --out {tmp} --heights=--": "argument --heights: expected a value",
+    "inflow --json {tmp}": "must be a file, but is a folder",
+    "inflow --netcdf {tmp}/file/a.nc": "must be writable",
+    "trim --thrust-coefficient 0.006 --json {tmp}": "must be a file, but is a folder",
+    f"inflow --json {'x' * 300}": "File name too long",
+    f"inflow --rotor {'x' * 300}.toml": "File name too long",
     "study": "--out",
     "study --out {tmp}/file/out": "must be writable",
     "study --out {tmp}/out --heights 0": "but is 0.0",
     "study --out {tmp}/out --slopes 46": "must exceed tan",
     "study --out {tmp}/out --rotor {tmp}/misspelt.toml": "did you mean 'radius'",
     "study --out {tmp}/out --rotor {tmp}/gap.toml": "gap.csv",
+    f"calibrate freewake --cases {'x' * 300} --out {{tmp}}/out": "File name too long",
+    f"simulate --case {'x' * 300} --out {{tmp}}/out": "File name too long",
+    "inflow --rotor {tmp}/pipe.toml": "pipe.toml: the path must be a file, but is a pipe",
+    "inflow --rotor {tmp}/zero.toml": "zero.toml: the path must be a file, but is a device",
+    "inflow --calibration {tmp}/pipe.toml": "but is a pipe",
+    "simulate --case {tmp}/zero.toml --out {tmp}/out": "but is a device",
+    "deck --case {tmp}/pipe.toml --out {tmp}/out": "but is a pipe",
     "unknown": "unknown",
     "": "COMMAND",
 }
@@ -124,6 +138,8 @@ BAD = {
 @pytest.mark.parametrize("line", BAD)
 def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
     (tmp_path / "file").write_text("")
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
     (tmp_path / "misspelt.toml").write_text(ROTOR.replace("radius", "radus"))
     (tmp_path / "gap.toml").write_text(ROTOR)
     (tmp_path / "gap.csv").write_text("alpha_deg,cl,cd\n-180,0,0\n0,,0.01\n180,0,0\n")
@@ -160,6 +176,12 @@ def test_the_program_itself_needs_no_settings(tmp_path):
     assert run.stdout.startswith("rotorjax 0.")
 
 
+def program(*arguments, **more):
+    """The program in a process of its own, as a user starts it."""
+    command = [sys.executable, "-m", "rotorjax.cli", *arguments]
+    return subprocess.run(command, capture_output=True, check=False, env=os.environ | more)
+
+
 def test_compiled_programs_are_kept_for_the_next_run(tmp_path):
     """In the user's cache folder, unless JAX is told another."""
     code = "import jax; from rotorjax import cli; cli._set_up_jax(); print(jax.config.jax_compilation_cache_dir)"
@@ -168,5 +190,54 @@ def test_compiled_programs_are_kept_for_the_next_run(tmp_path):
         env = {key: value for key, value in os.environ.items() if not key.startswith("JAX_")} | more
         return subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True).stdout
 
-    assert Path(folder(XDG_CACHE_HOME=str(tmp_path)).strip()).parent == tmp_path / "rotorjax"
+    assert Path(folder(XDG_CACHE_HOME=str(tmp_path)).strip()).parent == tmp_path / "rotorjax" / "programs"
     assert folder(JAX_COMPILATION_CACHE_DIR="elsewhere").strip() == "elsewhere"
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])
+def test_terminals_without_greek_letters_are_spelt_to(encoding):
+    run = program("inflow", "--help", PYTHONIOENCODING=encoding)
+    assert run.returncode == 0
+    assert "climb velocity over OmegaR" in run.stdout.decode(encoding)
+
+
+def test_help_needs_no_library():
+    code = "import sys; from rotorjax.cli import parser; parser().format_help(); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {"jax", "numpy", "scipy", "matplotlib", "xarray"}.isdisjoint(run.stdout.split())
+
+
+def fails_with(error):
+    def solver(model, start, progress):
+        raise error
+
+    return solver
+
+
+def test_a_fault_of_ours_has_a_code_of_its_own_and_says_where(solver, capsys, monkeypatch):
+    solver(fails_with(TypeError("unhashable\ntype")))
+    assert main(["inflow"]) == 70
+    told = capsys.readouterr().err
+    assert "internal error: TypeError: unhashable type (test_cli.py:" in told
+    assert "Traceback" not in told
+    assert "please report it" in told
+    monkeypatch.setenv("ROTORJAX_TRACEBACK", "1")
+    assert main(["inflow"]) == 70
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_only_a_study_says_that_it_keeps_cases(solver, capsys):
+    solver(fails_with(KeyboardInterrupt()))
+    assert main(["inflow"]) == 130
+    assert capsys.readouterr().err.strip().endswith("rotorjax inflow: interrupted")
+
+
+LONG = "from rotorjax.commands import inflow; inflow.run = lambda _: print('x' * 2**20) or 0\n"
+
+
+def test_a_reader_that_has_gone_is_no_fault():
+    code = f"{LONG}from rotorjax.cli import main\nraise SystemExit(main(['inflow']))"
+    line = f'{sys.executable} -c "{code}" | true; echo ${{PIPESTATUS[0]}}'
+    run = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "141"
+    assert "Traceback" not in run.stderr

@@ -4,17 +4,18 @@ All that a case needs is evaluated at once, in one compiled function that every 
 evaluation of the Legendre functions costs seconds of compilation and microseconds of work.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
+from rotorjax.inflow.momentum import VORTEX_RING
+from rotorjax.limits import check_axial, check_flight
 from rotorjax.potential import loading, rigid_cylinder
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import (
@@ -116,6 +117,25 @@ def of_pressure(case: Case, settings: StudySettings, tau: np.ndarray, stations: 
     return evaluate(models_of(case, settings), jnp.asarray(tau), stations, jnp.asarray(settings.climb_ratio))
 
 
+def axial_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
+    """Steady states in any axial flight that momentum theory knows; a thrust down is one up, upside down.
+
+    In the windmill brake state, out of ground effect, the air goes up with V_T = −(V_c + v) and V̄ = −(V_c + 2v); else
+    `steady_state`.
+    """
+    thrust = loading.thrust_coefficient(tau, model.modes)
+    sign = jnp.where(thrust < 0, -1.0, 1.0)
+    tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
+    windmill = climb <= VORTEX_RING[0] * hover
+    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb))
+    if model.ground is None:
+        inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
+        through, varying = inner - climb / 2, 2 * inner
+        braked = tau / jnp.where(model.varying, varying, through)
+        state = FiniteState(jnp.where(windmill, braked, state.a), state.c)
+    return FiniteState(sign * state.a, sign * state.c)
+
+
 @eqx.filter_jit
 def evaluate(
     models: tuple[FiniteStateModel, FiniteStateModel],
@@ -125,7 +145,7 @@ def evaluate(
 ) -> FiniteStateResult:
     """Steady states of a loading and all fields of `FiniteStateResult`; models: as `models_of` returns them."""
     model, printed = models
-    state, printed_state = steady_state(model, tau, climb), steady_state(printed, tau, climb)
+    state, printed_state = axial_state(model, tau, climb), axial_state(printed, tau, climb)
     x, y, nu, weights = (jnp.asarray(v, tau.dtype) for v in model.quadrature.rule())
     area = 2 * nu * weights  # r dr = −ν dν
     grid_r, grid_psi, sides = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI, DIAMETER_PSI))
@@ -174,13 +194,16 @@ def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Rotor
     )
     models = models_of(case, settings)
     model = models[0]
-    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * 0.005)
+    guess = check_axial("vpbfsm", settings.rotor, settings.operating)
+    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * guess)
     tau, converged, total = _self_consistent(start, model, settings.rotor, settings.operating, stations)
-    if not (bool(converged) and float(loading.thrust_coefficient(tau, model.modes)) > 0):
+    thrust = float(loading.thrust_coefficient(tau, model.modes))
+    if not (bool(converged) and thrust * guess > 0):
         raise InputError(
             f"Argument `collective` must give a loading that thrusts upward, but at {settings.collective_deg:g} deg "
-            "no steady one was found"
+            f"no steady one was found (residual tolerance {_tolerance(tau.dtype):.0e})"
         )
+    check_flight("vpbfsm", thrust, settings.climb_ratio)
     return evaluate(models, tau, stations, jnp.asarray(settings.climb_ratio)), total, stations
 
 
@@ -190,15 +213,23 @@ def _self_consistent(start, model, rotor, operating, stations):
 
     def blade(tau) -> SectionLoads:
         x, y = _polar(stations.r, stations.psi)
-        down = disk_inflow(steady_state(model, tau, climb), x, y, model) + climb
+        down = disk_inflow(axial_state(model, tau, climb), x, y, model) + climb
         return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
 
     def residual(tau, _):
         return _pressure(disk_loading(rotor, blade(tau)), stations, model) - tau
 
-    found = optx.root_find(residual, optx.Newton(rtol=1e-10, atol=1e-12), start, max_steps=50, throw=False)
+    import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
+
+    rtol = _tolerance(start.dtype)
+    found = optx.root_find(residual, optx.Newton(rtol=rtol, atol=rtol / 100), start, max_steps=50, throw=False)
     total = coefficients_of(rotor, blade(found.value), stations.r, stations.widths)
     return found.value, found.result == optx.RESULTS.successful, total
+
+
+def _tolerance(dtype: Any) -> float:
+    """Relative change of the pressure terms at which they count as found: 1e-10, or single precision's rounding."""
+    return 1e-10 if jnp.finfo(dtype).bits == 64 else 2e-5
 
 
 @eqx.filter_jit

@@ -4,6 +4,7 @@ One colour belongs to each model throughout (Okabe and Ito's palette, told apart
 height or slope run along a perceptually uniform map. Drawing needs no display and changes no global setting.
 """
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,7 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from rotorjax.io.atomic import whole_file
+from rotorjax.bench.azimuth import refine_azimuth
+from rotorjax.io.atomic import write_bytes
 
 FREE_WAKE, VPBFSM, PRINTED, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#E69F00", "#009E73", "#222222"
 MODEL_STYLE: dict[str, dict[str, Any]] = {
@@ -71,9 +73,12 @@ def save(figure: Figure, stem: str | Path, formats: Sequence[str] = ("png", "pdf
 
 def save_file(figure: Figure, path: str | Path) -> None:
     """Write one whole picture, its format from the name's ending; the same picture gives the same file."""
-    metadata = {"CreationDate": None} if Path(path).suffix == ".pdf" else {}
-    with style(), whole_file(path) as temporary:
-        figure.savefig(temporary, metadata=metadata)
+    ending = Path(path).suffix.lower().removeprefix(".")
+    metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending, {})
+    file = io.BytesIO()
+    with style():
+        figure.savefig(file, format=ending, metadata=metadata)
+    write_bytes(path, file.getvalue())
 
 
 def series_colours(count: int) -> list[Any]:
@@ -110,7 +115,8 @@ def polar_contour(
     levels: np.ndarray,
     sides: tuple[str, str] = ("mountain side", "valley side"),
 ) -> Any:
-    """Filled contours of values (K, R) over the disk; ψ = 0 (aft, mountain) at the right, ψ = 270° at the top.
+    """Filled contours of values (K, R) over the disk; seen from above: ψ = 0 (aft, mountain) at the right,
+    ψ = 90° (starboard) at the top.
 
     axes: polar. psi: equally spaced over a turn (rad); few azimuths are refined by their Fourier series. sides: names
     of ψ = 0 and 180°. Returns the contour set, for a colour bar.
@@ -120,27 +126,16 @@ def polar_contour(
     filled = axes.contourf(closed_psi, r, closed.T, levels=levels, cmap="viridis", extend="both")
     axes.contour(closed_psi, r, closed.T, levels=levels[::2], colors="white", linewidths=0.4, alpha=0.6)
     axes.set_theta_zero_location("E")
-    axes.set_theta_direction(-1)
     axes.set(ylim=(0, 1), yticks=[0.5, 1.0])
     axes.set_yticklabels(["0.5", ""], color="white", fontsize=8)
     axes.set_thetagrids(range(0, 360, 90), ["", "ψ = 90°", "", "ψ = 270°"], fontsize=8)
     axes.grid(color="white", linewidth=0.4, alpha=0.5)
     axes.tick_params(pad=1)
+    axes.set_xlabel("seen from above", fontsize=8)
     for x, rotation, text in ((1.05, 270, f"{sides[0]}, ψ = 0°"), (-0.05, 90, f"{sides[1]}, ψ = 180°")):
         look = {"rotation": rotation, "ha": "center", "va": "center", "fontstyle": "italic", "fontsize": 8}
         axes.text(x, 0.5, text, transform=axes.transAxes, **look)
     return filled
-
-
-def refine_azimuth(psi: np.ndarray, values: np.ndarray, count: int = 72) -> tuple[np.ndarray, np.ndarray]:
-    """Values (K, R) at equally spaced azimuths from 0, at `count` of them instead, by their Fourier series."""
-    if psi.size >= count:
-        return psi, values
-    spectrum = np.fft.rfft(values, axis=0)
-    if psi.size % 2 == 0 and psi.size > 1:
-        spectrum[-1] *= 0.5  # the highest cosine is shared by two frequencies of the finer grid
-    fine = np.fft.irfft(spectrum, count, axis=0) * count / psi.size
-    return 2 * np.pi / count * np.arange(count), fine
 
 
 def shared_levels(fields: Sequence[np.ndarray], count: int = 15) -> np.ndarray:

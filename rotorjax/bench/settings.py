@@ -95,10 +95,7 @@ def study_settings(
         operating = eqx.tree_at(lambda o: o.collective, operating, jnp.deg2rad(jnp.asarray(collective_deg, float)))
     if climb_ratio:
         operating = eqx.tree_at(lambda o: o.climb, operating, climb_ratio * operating.tip_speed(body.radius))
-    if "azimuths" not in wake:  # a periodic wake holds a whole number of slices for each blade
-        default = (quick_settings if quick else wake_settings)().azimuths
-        wake["azimuths"] = body.blades * -(-default // body.blades)
-    numbers = (quick_settings if quick else wake_settings)(**wake)
+    numbers = (quick_settings if quick else wake_settings)(**wake).for_blades(body.blades)
     return StudySettings(body, operating, numbers, harmonics=harmonics, flapping=flapping and body.hinge is not None)
 
 

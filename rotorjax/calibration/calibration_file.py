@@ -13,11 +13,9 @@ clearance = 0.6
 loading = "elliptic"
 """
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from json import dumps
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -27,13 +25,30 @@ from jaxtyping import Array, Float
 from rotorjax import __version__
 from rotorjax.calibration import hayden, measured, taught
 from rotorjax.calibration.parameters import ParameterSet
+from rotorjax.checks import Range, shown
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_text
+from rotorjax.io.toml_file import OTHERS, Key, Schema, Tables, read_toml, value_of
 from rotorjax.potential.model import FiniteState, FiniteStateModel, steady_state
 
 MODEL_VERSION = 2  # raised when the finite-state equations change so that fitted values no longer mean the same
 SETS: dict[str, ParameterSet] = {s.name: s for s in (hayden.PARAMETERS, taught.PARAMETERS, measured.PARAMETERS)}
-_HEAD = ("set", "model_version", "rotorjax", "converged", "rms_error")
+_COUNT = Key("whole number", Range(1, 1000))
+SCHEMA: Schema = {
+    "calibration": {
+        "set": Key("text", required=True),
+        "model_version": Key("whole number", Range(1, 1e6), required=True),
+        "rotorjax": Key("text", required=True),
+        "converged": Key("true or false", required=True),
+        "rms_error": Key("number", Range(0.0), required=True),
+    },
+    "parameters": {OTHERS: Key("number")},
+    "fitted_with": {
+        "radial_terms": _COUNT,
+        "source_terms": _COUNT,
+        OTHERS: Key("anything"),
+    },  # what a reader wants to know
+}
 
 
 @dataclass(frozen=True)
@@ -104,38 +119,29 @@ def load(path: str | Path) -> Calibration:
     Raises InputError where it is not there, not a calibration, of another model version or parameter set, misses or
     adds a parameter, or a value is outside its range.
     """
-    try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        head, given = dict(content["calibration"]), dict(content["parameters"])
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: the file must be a calibration in TOML, but cannot be read: {error}") from None
-    except (KeyError, TypeError, ValueError):
-        raise InputError(f"{path}: the file must hold [calibration] and [parameters], but does not") from None
-    if missing := [n for n in _HEAD if n not in head]:
-        raise InputError(f"{path}: [calibration] must hold {', '.join(_HEAD)}, but lacks {missing[0]}")
+    return read_toml(path, SCHEMA, _build)
+
+
+def _build(content: Tables, folder: Path) -> Calibration:
+    del folder
+    head = content["calibration"]
     if head["model_version"] != MODEL_VERSION:
         raise InputError(
-            f"{path}: the file must be for model version {MODEL_VERSION}, but is for {head['model_version']}: "
-            "calibrate again"
+            f"the file must be for model version {MODEL_VERSION}, but is for {head['model_version']}: calibrate again"
         )
     if head["set"] not in SETS:
-        raise InputError(f"{path}: the parameter set must be one of {', '.join(SETS)}, but is {head['set']!r}")
-    _check_parameters(path, SETS[head["set"]], given)
-    fitted_with = content.get("fitted_with", {})
-    return Calibration(head["set"], given, bool(head["converged"]), float(head["rms_error"]), fitted_with)
+        raise InputError(f"[calibration] set must be one of {', '.join(SETS)}, but is {shown(head['set'])}")
+    given = _parameters(SETS[head["set"]], content.get("parameters", {}))
+    return Calibration(head["set"], given, head["converged"], head["rms_error"], content.get("fitted_with", {}))
 
 
-def _check_parameters(path: str | Path, parameters: ParameterSet, given: dict[str, Any]) -> None:
+def _parameters(parameters: ParameterSet, given: dict[str, Any]) -> dict[str, float]:
     if set(given) != set(parameters.names):
         raise InputError(
-            f"{path}: [parameters] must hold {', '.join(parameters.names)}, but holds {', '.join(given) or 'nothing'}"
+            f"[parameters] must hold {', '.join(parameters.names)}, but holds {', '.join(given) or 'nothing'}"
         )
-    for p in parameters.parameters:
-        value = given[p.name]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
-            raise InputError(f"{path}: `{p.name}` must be a finite number, but is {value!r}")
-        if not p.lower <= value <= p.upper:
-            raise InputError(f"{path}: `{p.name}` must lie in [{p.lower:g}, {p.upper:g}], but is {value:g}")
+    keys = {p.name: Key("number", Range(float(p.lower), float(p.upper))) for p in parameters.parameters}
+    return {name: value_of(f"[parameters] {name}", given[name], key) for name, key in keys.items()}
 
 
 def _toml(value: Any) -> str:

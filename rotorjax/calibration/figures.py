@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,26 +19,25 @@ from rotorjax.bench.plotting import (
     save_file,
     style,
 )
-
-if TYPE_CHECKING:
-    from rotorjax.calibration.freewake_run import FreeWakeRun
-    from rotorjax.calibration.hayden_run import HaydenRun
-    from rotorjax.calibration.measured_run import MeasuredRun
+from rotorjax.calibration import hayden
+from rotorjax.calibration.freewake_run import FreeWakeRun
+from rotorjax.calibration.hayden_run import HaydenRun
+from rotorjax.calibration.measured import AGES_DEG
+from rotorjax.calibration.measured_run import MeasuredRun
+from rotorjax.reference.published import caradonna_tung, hayden_factor
 
 CALIBRATED = "#CC79A7"  # of the same palette as the models' colours
 DRIVERS = {"least_squares": "least squares", "lbfgs": "L-BFGS", "adam": "Adam"}
 CALIBRATED_STYLE: dict[str, Any] = {"color": CALIBRATED, "linestyle": "-", "label": "VPBFSM, calibrated"}
 
 
-def hayden_figure(result: "HaydenRun", path: str | Path) -> None:
+def hayden_figure(result: HaydenRun, path: str | Path) -> None:
     """Inflow ratio over height beside Hayden's factor, and the rms over the steps of each driver."""
-    from rotorjax.calibration import hayden
-
     with style():
         figure = new_figure(10.0, 4.2)
         left, right = figure.subplots(1, 2)
         fine = np.linspace(min(hayden.HEIGHTS[0], float(jnp.min(result.data.heights))), 3.5, 101)
-        left.plot(fine, hayden.hayden_factor(jnp.asarray(fine)), color=INK, label="Hayden")
+        left.plot(fine, hayden_factor(jnp.asarray(fine)), color=INK, label="Hayden")
         h = np.asarray(result.data.heights)
         order = np.argsort(h)
         radius, clearance = result.all_values
@@ -56,7 +55,7 @@ def hayden_figure(result: "HaydenRun", path: str | Path) -> None:
     save_file(figure, path)
 
 
-def case_figure(result: "FreeWakeRun", name: str, path: str | Path) -> None:
+def case_figure(result: FreeWakeRun, name: str, path: str | Path) -> None:
     """Inflow of one case across the diameter: free wake, default, calibrated."""
     with style():
         figure = new_figure(6.0, 4.2)
@@ -64,7 +63,7 @@ def case_figure(result: "FreeWakeRun", name: str, path: str | Path) -> None:
     save_file(figure, path)
 
 
-def draw_case(axes: Axes, result: "FreeWakeRun", name: str) -> None:
+def draw_case(axes: Axes, result: FreeWakeRun, name: str) -> None:
     """Draw one case into axes."""
     row = result.data.names.index(name)
     slope = float(result.data.slopes[row])
@@ -84,7 +83,7 @@ def draw_case(axes: Axes, result: "FreeWakeRun", name: str) -> None:
     legend_below(axes, 3)
 
 
-def rms_figure(result: "FreeWakeRun", path: str | Path) -> None:
+def rms_figure(result: FreeWakeRun, path: str | Path) -> None:
     """Rms difference of every case before and after, the held-out ones marked."""
     with style():
         figure = new_figure(9.0, 4.2)
@@ -100,7 +99,7 @@ def rms_figure(result: "FreeWakeRun", path: str | Path) -> None:
     save_file(figure, path)
 
 
-def label(result: "FreeWakeRun", name: str) -> str:
+def label(result: FreeWakeRun, name: str) -> str:
     """A case's name for readers."""
     row = result.data.names.index(name)
     if not float(result.data.over_ground[row]):
@@ -109,7 +108,7 @@ def label(result: "FreeWakeRun", name: str) -> str:
     return f"h = {float(result.data.heights[row]):g}" + (f", δ = {slope:.3g}°" if slope else "")
 
 
-def held_figures(result: "FreeWakeRun", folder: str | Path) -> Sequence[Path]:
+def held_figures(result: FreeWakeRun, folder: str | Path) -> Sequence[Path]:
     """One picture for each held-out case; returns their paths."""
     paths = [Path(folder) / f"held_{name}.png" for name in result.held]
     for name, path in zip(result.held, paths, strict=True):
@@ -117,11 +116,8 @@ def held_figures(result: "FreeWakeRun", folder: str | Path) -> Sequence[Path]:
     return paths
 
 
-def measured_figure(result: "MeasuredRun", path: str | Path) -> None:
+def measured_figure(result: MeasuredRun, path: str | Path) -> None:
     """Section lift and path of the tip vortex: measured, with the default settings and with the fitted ones."""
-    from rotorjax.calibration.measured import AGES_DEG
-    from rotorjax.reference.published import caradonna_tung
-
     groups = np.array(result.data.groups)
     panels = {
         "lift": (caradonna_tung().r, r"$r/R$", r"section lift $c_l$"),

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -12,13 +11,11 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from rotorjax.calibration.calibration_file import Calibration, save
-from rotorjax.calibration.figures import held_figures, rms_figure
+from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.calibration.fit import Fit, Method, Progress, calibrate
 from rotorjax.calibration.record import fit_entry
 from rotorjax.calibration.taught import PARAMETERS
 from rotorjax.calibration.teacher import Lessons, default_held, inflow, lessons, residual, rms_difference
-from rotorjax.io.atomic import make_folder, write_json
 
 HALVED = 0.5
 
@@ -127,19 +124,9 @@ def record(result: FreeWakeRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write(result: FreeWakeRun, folder: str | Path) -> Calibration:
-    """Write calibration.toml, calibration.json, rms.png and a picture of each held-out case into a folder.
-
-    Raises InputError where it cannot be written.
-    """
-    folder = make_folder(folder)
-    table = PARAMETERS.table(result.values)
-    calibration = Calibration("freewake", table, result.fit.converged, result.fit.rms, result.about)
-    save(folder / "calibration.toml", calibration)
-    write_json(folder / "calibration.json", record(result))
-    rms_figure(result, folder / "rms.png")
-    held_figures(result, folder)
-    return calibration
+def calibration_of(result: FreeWakeRun) -> Calibration:
+    """The fit as a file keeps it."""
+    return Calibration("freewake", PARAMETERS.table(result.values), result.fit.converged, result.fit.rms, result.about)
 
 
 def report(result: FreeWakeRun) -> str:

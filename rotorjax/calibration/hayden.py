@@ -27,6 +27,7 @@ from rotorjax.potential import loading
 from rotorjax.potential.contraction import CLEARANCE, MOMENTUM, contraction
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, mean_inflow, steady_state
+from rotorjax.reference.published import hayden_factor
 
 HEIGHTS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 LOWEST, HIGHEST = 0.3, 4.53  # over R; Hayden's factor reaches 1 at the upper end and was not measured below the lower
@@ -42,11 +43,6 @@ PARAMETERS = ParameterSet(
 )
 Loading = Literal["elliptic", "uniform", "triangular"]
 _SHAPES = {"elliptic": lambda r: r * np.sqrt(1 - r * r), "uniform": lambda r: r, "triangular": lambda r: r**2}
-
-
-def hayden_factor(height: Float[Array, "*N"]) -> Float[Array, "*N"]:
-    """Return Hayden's k_G of heights over R: induced power over that out of ground effect at the same thrust, ≤ 1."""
-    return jnp.minimum(1 / (0.9926 + 0.0379 * (2 / height) ** 2), 1.0)
 
 
 class HaydenData(eqx.Module):

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,13 +11,11 @@ import numpy as np
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import select
 from rotorjax.calibration import hayden
-from rotorjax.calibration.calibration_file import Calibration, save
-from rotorjax.calibration.figures import hayden_figure
+from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.calibration.fit import Fit, Many, Progress, calibrate, calibrate_many, even_starts
 from rotorjax.calibration.hayden import HaydenData
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
-from rotorjax.io.atomic import make_folder, write_json
 
 STARTS = 256
 
@@ -126,16 +123,11 @@ def record(result: HaydenRun) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write(result: HaydenRun, folder: str | Path) -> Calibration:
-    """Write calibration.toml, calibration.json and hayden.png into a folder. Raises InputError where it cannot be."""
-    folder = make_folder(folder)
+def calibration_of(result: HaydenRun) -> Calibration:
+    """The fit as a file keeps it."""
     values = hayden.PARAMETERS.table(result.all_values)
     about = {"loading": result.loading, "heights": [float(h) for h in result.data.heights], "free": result.data.free}
-    calibration = Calibration("hayden", values, result.fit.converged, result.fit.rms, about)
-    save(folder / "calibration.toml", calibration)
-    write_json(folder / "calibration.json", record(result))
-    hayden_figure(result, folder / "hayden.png")
-    return calibration
+    return Calibration("hayden", values, result.fit.converged, result.fit.rms, about)
 
 
 def report(result: HaydenRun) -> str:

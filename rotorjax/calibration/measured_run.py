@@ -3,7 +3,6 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,7 +11,7 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from rotorjax.bench.settings import study_settings
-from rotorjax.calibration.calibration_file import Calibration, save
+from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.calibration.fit import Fit, Progress, conclude, judge
 from rotorjax.calibration.measured import (
     COLLECTIVE_DEG,
@@ -27,7 +26,6 @@ from rotorjax.calibration.measured import (
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
-from rotorjax.io.atomic import make_folder, write_json
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.preconditioner import harmonic_inverse
 from rotorjax.wake.solution import Solution, solve
@@ -213,21 +211,13 @@ def record(result: MeasuredRun) -> dict[str, Any]:
     return fit_entry(result.fit, "wake", result.rms(result.before, True)) | {"rows": rows, "rms_over_margin": verdict}
 
 
-def write(result: MeasuredRun, folder: str | Path) -> Calibration:
-    """Write calibration.toml, calibration.json and wake.png into a folder. Raises InputError where it cannot."""
-    from rotorjax.calibration.figures import measured_figure
-
-    folder = make_folder(folder)
+def calibration_of(result: MeasuredRun) -> Calibration:
+    """The fit as a file keeps it."""
     values = {p.name: p.printed for p in PARAMETERS.parameters} | result.fit.parameters.table(result.fit.values)
-    groups = [g for g in MARGINS if result.taught[list(result.data.groups).index(g)]]
     about = {
         "rotor": ROTOR,
         "collective_deg": COLLECTIVE_DEG,
-        "fitted": groups,
+        "fitted": [g for g in MARGINS if result.taught[list(result.data.groups).index(g)]],
         "free": list(result.fit.parameters.names),
     }
-    calibration = Calibration("wake", values, result.fit.converged, result.fit.rms, about)
-    save(folder / "calibration.toml", calibration)
-    write_json(folder / "calibration.json", record(result))
-    measured_figure(result, folder / "wake.png")
-    return calibration
+    return Calibration("wake", values, result.fit.converged, result.fit.rms, about)

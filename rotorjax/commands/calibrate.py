@@ -3,8 +3,12 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotorjax.commands.arguments import names_of
+
+if TYPE_CHECKING:
+    from rotorjax.calibration.output import Run
 
 LOADINGS = ("elliptic", "uniform", "triangular")
 
@@ -52,10 +56,7 @@ def run_hayden(chosen: argparse.Namespace) -> int:
     tau = None if chosen.cases is None else hayden_run.loads_of(find_cases(chosen.cases), heights)
     with _Bar("hayden") as bar:
         result = hayden_run.run(heights, names_of(chosen.parameters), chosen.loading, tau, bar.show)
-    print(hayden_run.report(result))
-    hayden_run.write(result, chosen.out)
-    print(f"written: {chosen.out / 'calibration.toml'}")
-    return 0 if result.fit.converged else 1
+    return _finish(result, chosen.out)
 
 
 def run_freewake(chosen: argparse.Namespace) -> int:
@@ -70,10 +71,7 @@ def run_freewake(chosen: argparse.Namespace) -> int:
     merged = find_cases(chosen.cases)
     with _Bar("free wake") as bar:
         result = freewake_run.run(merged, names, chosen.held, progress=bar.show)
-    print(freewake_run.report(result))
-    freewake_run.write(result, chosen.out)
-    print(f"written: {chosen.out / 'calibration.toml'}")
-    return 0 if result.fit.converged else 1
+    return _finish(result, chosen.out)
 
 
 def run_wake(chosen: argparse.Namespace) -> int:
@@ -87,9 +85,16 @@ def run_wake(chosen: argparse.Namespace) -> int:
     make_folder(chosen.out)  # before the work, not after it
     with _Bar("wake") as bar:
         result = measured_run.run(names, fitted, chosen.quick, progress=bar.show)
-    print(measured_run.report(result))
-    measured_run.write(result, chosen.out)
-    print(f"written: {chosen.out / 'calibration.toml'}")
+    return _finish(result, chosen.out)
+
+
+def _finish(result: "Run", folder: Path) -> int:
+    """Print and write what was found; the exit code."""
+    from rotorjax.calibration.output import report, write
+
+    print(report(result))
+    write(result, folder)
+    print(f"written: {folder / 'calibration.toml'}")
     return 0 if result.fit.converged else 1
 
 

@@ -29,7 +29,6 @@
 Height is counted under the hub, the pitch turns the deck about that point.
 """
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -38,20 +37,42 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from rotorjax.checks import check_number
-from rotorjax.errors import InputError
+from rotorjax.checks import Range
+from rotorjax.errors import ArgumentError, InputError
+from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.moving_ground import Variant, require_clear, require_increasing
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.rotor.rotor_file import closest
 
-_KEYS = {
-    "rotor": {"name": "uh60", "collective_deg": None, "rigid": None},
-    "model": {"variant": "dynamic", "harmonics": 1, "radial_terms": 3},
-    "time": {"duration": None, "steps_per_turn": 16},
-    "path": {"t": None, "height": None, "edge": None},
-    "deck": {"heave": 0.0, "heave_period": 8.0, "pitch_deg": 0.0, "pitch_period": 10.0, "edge_azimuth_deg": 0.0},
+_PERIOD = Range(0.05, 1e4, "s")
+SCHEMA: Schema = {
+    "rotor": {
+        "name": Key("text"),
+        "collective_deg": Key("number", Range(-45.0, 45.0, "deg")),
+        "rigid": Key("true or false"),
+    },
+    "model": {
+        "variant": Key("text", choices=get_args(Variant)),
+        "harmonics": Key("whole number", Range(1, 4)),
+        "radial_terms": Key("whole number", Range(1, 5)),
+    },
+    "time": {
+        "duration": Key("number", Range(1e-3, 1e5, "s"), required=True),
+        "steps_per_turn": Key("whole number", Range(12, 720)),
+    },
+    "path": {
+        "t": Key("numbers", Range(-1e5, 1e6, "s"), required=True),
+        "height": Key("numbers", Range(-10.0, 100.0, "R"), required=True),
+        "edge": Key("numbers", Range(-1000.0, 1000.0, "R")),
+    },
+    "deck": {
+        "heave": Key("number", Range(0.0, 2.0, "R")),
+        "heave_period": Key("number", _PERIOD),
+        "pitch_deg": Key("number", Range(0.0, 30.0, "deg")),
+        "pitch_period": Key("number", _PERIOD),
+        "edge_azimuth_deg": Key("number", Range(-360.0, 360.0, "deg")),
+    },
 }
 _MOST_STEPS = 500_000
 
@@ -115,92 +136,58 @@ def read_case(path: str | Path) -> DeckCase:
     misspelt, values out of range, times that do not increase or do not cover the duration, and a deck that would cut
     the disk.
     """
-    path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error).splitlines()[0]
-        raise InputError(f"{path}: the file must be TOML, but cannot be read: {reason}") from None
-    try:
-        return _build(_filled(data), path.parent)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_toml(path, SCHEMA, _build)
 
 
-def _filled(data: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """All keys with their defaults; unknown ones are refused."""
-    for table, content in data.items():
-        if table not in _KEYS:
-            raise InputError(f"the table [{table}] is unknown: {closest(table, _KEYS)}")
-        if not isinstance(content, dict):
-            raise InputError(f"`{table}` must be a table [{table}], but is {content!r}")
-        for key in content:
-            if key not in _KEYS[table]:
-                raise InputError(f"[{table}] {key} is unknown: {closest(key, _KEYS[table])}")
-    filled = {table: {**keys, **data.get(table, {})} for table, keys in _KEYS.items()}
-    for table, key in (("time", "duration"), ("path", "t"), ("path", "height")):
-        if filled[table][key] is None:
-            raise InputError(f"[{table}] {key} must be given, but is missing")
-    return filled
-
-
-def _build(data: dict[str, dict[str, Any]], folder: Path) -> DeckCase:
-    name = str(data["rotor"]["name"])
+def _build(data: Tables, folder: Path) -> DeckCase:
+    body, model, time, path, deck = (data.get(name, {}) for name in SCHEMA)
+    name = body.get("name", "uh60")
     rotor, operating = load(folder / name if name.endswith(".toml") else name)
-    model, time, deck = data["model"], data["time"], data["deck"]
-    if model["variant"] not in get_args(Variant):
-        raise InputError(f"[model] variant must be one of {get_args(Variant)}, but is {model['variant']!r}")
-    given = data["rotor"]["collective_deg"]
-    collective = np.rad2deg(float(operating.collective)) if given is None else _number("collective_deg", given, -90, 90)
-    t, height = _points("t", data["path"]["t"]), _points("height", data["path"]["height"])
-    edge = None if data["path"]["edge"] is None else _points("edge", data["path"]["edge"])
     case = DeckCase(
         rotor=rotor,
         operating=operating,
-        collective=float(np.deg2rad(collective)),
-        rigid=_rigid(data["rotor"]["rigid"], rotor),
-        variant=model["variant"],
-        harmonics=_whole("harmonics", model["harmonics"], 1, 4),
-        radial_terms=_whole("radial_terms", model["radial_terms"], 1, 5),
-        steps_per_turn=_whole("steps_per_turn", time["steps_per_turn"], 12, 720),
-        duration=_number("duration", time["duration"], 0, np.inf, open_=True),
-        t=t,
-        height=height,
-        edge=edge,
-        heave=_number("heave", deck["heave"], 0, 2),
-        heave_period=_number("heave_period", deck["heave_period"], 0, np.inf, open_=True),
-        pitch=float(np.deg2rad(_number("pitch_deg", deck["pitch_deg"], 0, 30))),
-        pitch_period=_number("pitch_period", deck["pitch_period"], 0, np.inf, open_=True),
-        edge_azimuth=float(np.deg2rad(_number("edge_azimuth_deg", deck["edge_azimuth_deg"], -360, 360))),
+        collective=np.deg2rad(body["collective_deg"]) if "collective_deg" in body else float(operating.collective),
+        rigid=_rigid(body.get("rigid"), rotor),
+        variant=model.get("variant", "dynamic"),
+        harmonics=model.get("harmonics", 1),
+        radial_terms=model.get("radial_terms", 3),
+        steps_per_turn=time.get("steps_per_turn", 16),
+        duration=time["duration"],
+        t=np.array(path["t"]),
+        height=np.array(path["height"]),
+        edge=np.array(path["edge"]) if "edge" in path else None,
+        heave=deck.get("heave", 0.0),
+        heave_period=deck.get("heave_period", 8.0),
+        pitch=np.deg2rad(deck.get("pitch_deg", 0.0)),
+        pitch_period=deck.get("pitch_period", 10.0),
+        edge_azimuth=rotor.side * np.deg2rad(deck.get("edge_azimuth_deg", 0.0)),  # starboard of a mirrored rotor
     )
+    _check_effect(path, deck)
     _check(case)
     return case
+
+
+def _check_effect(path: dict[str, Any], deck: dict[str, Any]) -> None:
+    """Refuse keys that would have no effect."""
+    needed = {"heave_period": ("heave", deck), "pitch_period": ("pitch_deg", deck), "edge_azimuth_deg": ("edge", path)}
+    for key, (other, table) in needed.items():
+        if key in deck and not table.get(other):
+            where = "[path]" if table is path else "[deck]"
+            raise InputError(f"[deck] {key} must come with {other} in {where}, without which it has no effect")
 
 
 def _check(case: DeckCase) -> None:
     require_increasing("path.t", case.t)  # type: ignore[arg-type]
     for name, values in {"height": case.height, "edge": case.edge}.items():
         if values is not None and values.shape != case.t.shape:
-            raise InputError(f"Argument `path.{name}` must hold {case.t.size} values as `t`, but holds {values.size}")
+            raise ArgumentError(f"path.{name}", f"hold {case.t.size} values as t", f"of {values.size}")
     if case.t[0] > 0 or case.t[-1] < case.duration:
-        raise InputError(
-            f"Argument `path.t` must cover 0 to {case.duration:g} s, but covers {case.t[0]:g} to {case.t[-1]:g}"
-        )
+        raise ArgumentError("path.t", f"cover 0 to {case.duration:g} s", f"{case.t[0]:g} to {case.t[-1]:g} s")
     psi = case.instants()
     if psi.size > _MOST_STEPS:
-        raise InputError(f"Argument `duration` must need at most {_MOST_STEPS} steps, but needs {psi.size}")
+        raise ArgumentError("time.duration", f"need at most {_MOST_STEPS} steps", f"{case.duration:g} s: {psi.size}")
     motion = case.motion(psi)
     require_clear(motion["height"], motion["slope"])  # type: ignore[arg-type]
-
-
-def _number(name: str, value: object, low: float, high: float, open_: bool = False) -> float:
-    return float(check_number(name, value, low, high, open_=open_))  # type: ignore[arg-type]
-
-
-def _whole(name: str, value: object, low: int, high: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise InputError(f"Argument `{name}` must be a whole number from {low} to {high}, but is {value!r}")
-    return value
 
 
 def _rigid(value: object, rotor: Rotor) -> bool:
@@ -209,13 +196,3 @@ def _rigid(value: object, rotor: Rotor) -> bool:
     if not isinstance(value, bool) or not (value or rotor.hinge is not None):
         raise InputError(f"[rotor] rigid must be true, or false for a rotor with hinge data, but is {value!r}")
     return value
-
-
-def _points(name: str, values: object) -> np.ndarray:
-    try:
-        array = np.array(values, float)
-    except (TypeError, ValueError):
-        array = np.zeros(0)
-    if array.ndim != 1 or array.size < 2 or not np.all(np.isfinite(array)):
-        raise InputError(f"Argument `path.{name}` must be a list of two or more finite numbers, but is {values!r}")
-    return array

@@ -1,16 +1,15 @@
 """A rotor over a ship's deck: pictures, animation and report of its histories."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import xarray as xr
-from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
-from rotorjax.io.atomic import whole_file
+from rotorjax.bench.film import write_film
 
 DYNAMIC, STATIC = plotting.FREE_WAKE, plotting.VPBFSM
 FLAPPING = {"beta_0": r"$\beta_0$", "beta_1c": r"$\beta_{1c}$", "beta_1s": r"$\beta_{1s}$"}
@@ -105,7 +104,7 @@ def _flapping(axes: Any, data: xr.Dataset) -> None:
 
 
 def snapshots(data: xr.Dataset) -> Figure:
-    """Draw the inflow over the disk at four instants, seen from above; forward is left, starboard down."""
+    """Draw the inflow over the disk at four instants, seen from above; forward is left, starboard up."""
     frames = np.linspace(0, data.sizes["frame"] - 1, _SNAPSHOTS).astype(int)
     with plotting.style():
         figure = plotting.new_figure(9.0, 3.0)
@@ -129,7 +128,7 @@ def _mesh(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _disk_axes(axes: Any, title: str) -> None:
-    axes.set(aspect="equal", xticks=[], yticks=[], title=title)
+    axes.set(aspect="equal", xticks=[], yticks=[], title=title, ylabel="seen from above")
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
@@ -139,10 +138,10 @@ def _disk_axes(axes: Any, title: str) -> None:
 def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 12) -> None:
     """Write a GIF: the rotor over the moving deck from the side, its inflow from above, and the mean inflow so far."""
     x, y, fields = _mesh(data)
-    times, count = data["frame_time"].values, data.sizes["frame"]
+    times = data["frame_time"].values
     at = np.searchsorted(data["time"].values, times - 1e-9)
-    with mpl.rc_context({**plotting.STYLE, "figure.dpi": 80}):  # type: ignore[arg-type]
-        figure = plotting.new_figure(8.5, 3.4)
+
+    def build(figure: Figure) -> Callable[[int], None]:
         side, disk, history = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.2))
         low, high = float(fields.min()), float(fields.max())
         mesh = disk.pcolormesh(x, y, fields[0], shading="gouraud", vmin=low, vmax=high, cmap="viridis")
@@ -154,18 +153,14 @@ def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 12) -
         history.set(xlabel="time, s", ylabel=r"$\lambda_0/\Omega R$")
         history.legend(loc="best")
 
-        def draw(frame: int) -> list[Any]:
+        def draw(frame: int) -> None:
             _side_view(side, data.isel(time=int(at[frame])), float(data["height"].max()))
             mesh.set_array(fields[frame])
             dot.set_data([times[frame]], [float(data["uniform"][at[frame]])])
-            return [mesh, dot]
 
-        draw(0)
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # laid out once, not again for each frame
-        film = FuncAnimation(figure, draw, frames=count, blit=False)
-        with whole_file(path) as temporary:
-            film.save(temporary, writer=PillowWriter(fps=frames_per_second))
+        return draw
+
+    write_film(path, build, data.sizes["frame"], (8.5, 3.4), frames_per_second)
 
 
 def _side_view(axes: Any, now: xr.Dataset, highest: float) -> None:

@@ -2,13 +2,13 @@
 
 from typing import Literal, get_args
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.inflow.finite_state import finite_state
 from rotorjax.inflow.interface import InflowModel
 from rotorjax.inflow.momentum import uniform
 from rotorjax.inflow.pitt_peters import pitt_peters
-from rotorjax.rotor.rotor_file import closest
 
 Inflow = Literal["uniform", "pitt-peters", "vpbfsm"]
 NAMES = get_args(Inflow)

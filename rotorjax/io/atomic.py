@@ -1,44 +1,40 @@
-"""Files that are whole or not there: written under a temporary name and renamed."""
+"""Files that are whole or not there: made in memory, written under a temporary name and renamed."""
 
 import json
 import math
 import os
+import platform
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+import zlib
 from pathlib import Path
 from typing import Any
 
 from rotorjax.errors import InputError
 
+LEFT_OVER = 3600.0  # s, after which another machine's temporary file is no longer being written
 
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path` with the same suffix; rename it to `path` if the block ends well.
 
-    An interrupted or failed block leaves the old file as it was. Raises InputError where the folder cannot be written.
+def write_bytes(path: str | Path, content: bytes | memoryview) -> None:
+    """Write a whole file. All files that rotorjax writes go through here.
+
+    The content appears under `path` complete or not at all; an interrupt leaves the old file as it was, and what a
+    killed run left half written is removed by the next one that writes `path`. What is no regular file (a pipe,
+    /dev/null) is written to, never replaced. Raises InputError where the file cannot be written, a full disk included.
     """
     path = Path(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
-    except OSError as error:
-        raise InputError(f"{path}: the folder must exist and be writable, but is not: {error.strerror}") from None
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        umask = os.umask(0)  # mkstemp makes private files; a result is as readable as any other file
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)
+        else:
+            _replace(path.resolve(), content)  # a link stays a link
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: the file must be writable, but is not: {_reason(error)}") from None
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a whole text file. Raises InputError where it cannot be written."""
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    """Write a whole text file in UTF-8. Raises InputError where it cannot be written."""
+    write_bytes(path, text.encode())
 
 
 def write_json(path: str | Path, content: Any) -> None:
@@ -56,9 +52,63 @@ def make_folder(path: str | Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
             pass
-    except OSError as error:
-        raise InputError(f"{path}: the output folder must be writable, but is not: {error.strerror}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: the output folder must be writable, but is not: {_reason(error)}") from None
     return path
+
+
+def check_output(path: str | Path | None) -> None:
+    """Prove, before the work, that a file can be written after it; its folder is made. None: nothing is to be written.
+
+    Raises InputError where it cannot.
+    """
+    if path is None:
+        return
+    path = Path(path)
+    try:
+        folder, special = path.resolve().parent, path.exists() and not path.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{str(path)!r}: the file must be writable, but is not: {_reason(error)}") from None
+    if path.is_dir():
+        raise InputError(f"{path}: the output must be a file, but is a folder")
+    if special and not os.access(path, os.W_OK):
+        raise InputError(f"{path}: the file must be writable, but is not")
+    if not special:
+        make_folder(folder)
+
+
+def _replace(path: Path, content: bytes | memoryview) -> None:
+    temporary = path.with_name(f".{_crc(path.name)}-{_crc(platform.node())}-{os.getpid()}.part")
+    for old in path.parent.glob(f".{_crc(path.name)}-*-*.part"):
+        if _left_over(old):
+            old.unlink(missing_ok=True)
+    try:
+        temporary.write_bytes(content)  # as readable as any other new file
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _crc(text: str) -> str:
+    return f"{zlib.crc32(os.fsencode(text)):08x}"
+
+
+def _left_over(temporary: Path) -> bool:
+    """Whether the process that wrote a temporary file is gone; of another machine's only its age tells."""
+    _, machine, process = temporary.stem.split("-")
+    if os.name != "posix" or machine != _crc(platform.node()):
+        return temporary.stat().st_mtime + LEFT_OVER < time.time()
+    try:
+        os.kill(int(process), 0)
+    except ProcessLookupError:
+        return True
+    except PermissionError:
+        return False
+    return int(process) == os.getpid()
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
 def _plain(value: Any) -> Any:

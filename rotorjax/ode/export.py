@@ -1,5 +1,6 @@
 """Handing linear models over: python-control, MATLAB, NetCDF. Files appear whole or not at all."""
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import xarray as xr
 
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
-from rotorjax.io.atomic import whole_file
+from rotorjax.io.atomic import write_bytes
 from rotorjax.ode.models import LinearModel, PeriodicModel
 
 
@@ -44,8 +45,9 @@ def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
         content |= {"t": model.t, "period": model.period, "x": model.x.T, "u": model.u, "y": model.y.T}
     for key in ("states", "inputs", "outputs", "input_units", "output_units"):
         content[key] = np.array(getattr(model, key), dtype=object)
-    with whole_file(path) as temporary:
-        scipy.io.savemat(temporary, content)
+    file = io.BytesIO()
+    scipy.io.savemat(file, content)
+    write_bytes(path, file.getvalue())
     return Path(path)
 
 

@@ -79,15 +79,21 @@ def _tangent(
     restart: int,
     inverse: Array | None = None,
     refinements: int = 1,
+    left: Callable | None = None,
 ) -> PyTree:
-    """Solve F_x dx = −F_p dp at the solution."""
+    """Solve F_x dx = −F_p dp at the solution; both sides first go through left(v, solution, *args), if there is one."""
     flat, unravel = ravel_pytree(solution)
+    here = jax.lax.stop_gradient((solution, *args))
+
+    def value(x: PyTree, args: tuple) -> Array:
+        found = residual(x, *args)
+        return ravel_pytree(found if left is None else left(found, *here))[0]
 
     def of_state(v: Array) -> Array:
-        return ravel_pytree(residual(unravel(v), *args))[0]
+        return value(unravel(v), args)
 
     def of_args(args: tuple) -> Array:
-        return ravel_pytree(residual(solution, *args))[0]
+        return value(solution, args)
 
     _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
     _, product = jax.linearize(of_state, flat)
@@ -101,8 +107,9 @@ def attach(
     method: Method = "dense",
     chunk: int = CHUNK,
     restart: int = 60,
-    inverse: Float[Array, "n n"] | None = None,
+    inverse: Float[Array, "n n"] | Callable[..., Array] | None = None,
     refinements: int = 1,
+    precondition: Callable[..., Callable] | None = None,
 ) -> PyTree:
     """Give a converged solution of residual(x, *args) = 0 its derivative with respect to args.
 
@@ -113,7 +120,10 @@ def attach(
     needs no matrix, at most 20 cycles of `restart` products, and gives NaN rather than a derivative that it could not
     solve for. inverse: that of ∂F/∂x over the raveled solution where the caller has it, instead of either. Each of the
     `refinements` takes one product with ∂F/∂x and makes good what the inverse misses; an exact one needs none, and the
-    program is then half as long. Derivatives flow through `args` only, not through arrays that `residual` closes over.
+    program is then half as long. precondition: what "gmres" is helped by, a function of (x, *args) that makes the map
+    (v, x, *args) → v, near the inverse. `inverse` too may be a function of (x, *args); either is called where a
+    derivative is wanted and nowhere else. Derivatives flow through `args` only, not through arrays that `residual`
+    closes over.
 
     Raises InputError where `method` is unknown.
     """
@@ -127,7 +137,10 @@ def attach(
     def rule(primals: tuple, tangents: tuple) -> tuple:
         # The value again, and not `solution`: second derivatives must see how it moves.
         x = value(*primals)
-        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, inverse, refinements)
+        here = jax.lax.stop_gradient((x, *primals[1]))
+        exact = inverse(*here) if callable(inverse) else inverse
+        left = None if precondition is None else precondition(*here)
+        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, exact, refinements, left)
 
     return value(jax.lax.stop_gradient(solution), traceable(args))
 

@@ -7,9 +7,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
-
-from rotorjax.calibration.hayden import hayden_factor
+from jaxtyping import Array, Float
 
 MASS = 0.849
 """Apparent mass of an impermeable disk over ρπR³, 8/(3π)."""
@@ -25,6 +23,14 @@ class Hover(NamedTuple):
     thrust: float
     r: Float[np.ndarray, " N"]
     lift: Float[np.ndarray, " N"]
+
+
+class Polar(NamedTuple):
+    """A measured hover polar. pitch_deg (N,); thrust, torque (N,): C_T and C_Q, rising."""
+
+    pitch_deg: Float[np.ndarray, " N"]
+    thrust: Float[np.ndarray, " N"]
+    torque: Float[np.ndarray, " N"]
 
 
 class Path(NamedTuple):
@@ -45,6 +51,19 @@ def caradonna_tung() -> Hover:
 
 
 @cache
+def caradonna_tung_thrust() -> dict[float, float]:
+    """Measured C_T by collective in degrees, 1250 rpm (NASA TM-81232)."""
+    return {float(r["collective_deg"]): float(r["CT"]) for r in _rows("caradonna_tung_thrust.csv")}
+
+
+@cache
+def knight_hefner(blades: int) -> Polar:
+    """Measured hover polar of Knight and Hefner's rotor with two or four blades (NACA TN 626, 1937)."""
+    rows = [r for r in _rows("knight_hefner.csv") if int(r["blades"]) == blades]
+    return Polar(*(np.array([float(r[name]) for r in rows]) for name in ("pitch_deg", "CT", "CQ")))
+
+
+@cache
 def caradonna_tung_path() -> Path:
     """Measured tip vortex at 8°, the authors' curve fit (NASA TM-81232, fig. 10)."""
     rows = np.array([[float(v) for v in r.values()] for r in _rows("tip_vortex_8deg.csv")])
@@ -54,6 +73,11 @@ def caradonna_tung_path() -> Path:
 def momentum_inflow(thrust: float) -> float:
     """Uniform inflow over ΩR in hover, √(C_T/2)."""
     return float(np.sqrt(thrust / 2))
+
+
+def figure_of_merit(thrust: float, torque: float) -> float:
+    """Ideal induced power over power, C_T^1.5/√2 / C_P (C_P = C_Q)."""
+    return float(thrust**1.5 / np.sqrt(2) / torque)
 
 
 def induced_power_factor(thrust: float, induced: float) -> float:
@@ -80,17 +104,37 @@ def landgrebe_pitch(thrust: float, twist_deg: float) -> float:
     return float(-(1.41 + 0.0141 * twist_deg) * np.sqrt(thrust / 2))
 
 
+def hayden_factor(height: Float[Array, "*N"]) -> Float[Array, "*N"]:
+    """Return Hayden's k_G of heights over R: induced power over that out of ground effect at the same thrust, ≤ 1."""
+    return jnp.minimum(1 / (0.9926 + 0.0379 * (2 / height) ** 2), 1.0)
+
+
+def isolated_rotors(height: float) -> float | None:
+    """Measured inflow near level ground over that far from it, at the same thrust: isolated model rotors in hover.
+
+    Mean curve of Knight & Hefner (NACA TN 835, 1941) and others as reduced by Prouty; digitised to 0.005, None where it
+    has no measurement. height: over R.
+    """
+    curve = np.array([[float(v) for v in row.values()] for row in _rows("isolated_rotors_in_ground_effect.csv")])
+    inside = curve[0, 0] <= height <= curve[-1, 0]
+    return float(np.interp(height, *curve.T)) if inside else None
+
+
 def hayden(height: float) -> float:
-    """Hayden's induced power in ground effect over that out of it, at the same thrust (AHS 32nd Forum, 1976)."""
+    """Hayden's induced power in ground effect over that out of it, at the same thrust (AHS 32nd Forum, 1976).
+
+    A fit to flight tests, so of rotors with a fuselage underneath. height: over R.
+    """
     return float(hayden_factor(jnp.asarray(height)))
 
 
 def cheeseman_bennett(height: float) -> float:
     """Cheeseman and Bennett's inflow in ground effect over that out of it, at the same thrust (ARC R&M 3021, 1955).
 
-    height: over R. The image source of a rotor in hover takes (R/4h)² off the inflow.
+    height: over R. Their T/T∞ = 1/(1 − (R/4h)²) holds at the same power. As induced power goes with T^1.5, at the same
+    thrust it is that to the power −3/2.
     """
-    return 1 - (1 / (4 * height)) ** 2
+    return (1 - (1 / (4 * height)) ** 2) ** 1.5
 
 
 @cache

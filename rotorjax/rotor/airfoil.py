@@ -3,8 +3,8 @@
 The table is a bicubic Hermite surface through the data: exact at every node, C1 in angle and Mach number everywhere,
 periodic at ±180°, constant beyond the first and last Mach number. The slopes at the nodes are those of Fritsch &
 Carlson's monotone interpolant (scipy's PCHIP, doi:10.1137/0717021), chosen because a table of a stalled section has
-steps that an ordinary spline would overshoot, to a negative drag, say. They are computed once in float64 numpy;
-derivatives with respect to the table's values hold them fixed.
+steps that an ordinary spline would overshoot, to a negative drag, say. They are computed once in float64 numpy, from
+traced coefficients in jax; derivatives with respect to the nodes of a table that is made already hold them fixed.
 
 A low-speed table may ask for the Prandtl-Glauert rule: cl/√(1 − M²) where the flow is attached (|α| up to 6°), fading
 out by 14°, where the lift is set by separation, which the rule knows nothing of. The drag is left as it is: without a
@@ -17,15 +17,18 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.interpolate import PchipInterpolator
 
-from rotorjax.checks import check_number
+from rotorjax.checks import Range, array, check_list, check_range, known
 from rotorjax.errors import InputError
 
 # The rule is used as it stands to M = 0.7; above, its Mach number levels off towards 0.85 so that it stays finite
 # through M = 1.
 _GLAUERT_EXACT, _GLAUERT_RANGE = 0.7, 0.15
 _ATTACHED, _SEPARATED = np.deg2rad(6.0), np.deg2rad(14.0)
+_LOW_SPEED = 0.2  # Mach number up to which a table counts as one of low speed (the rule's own factor is 1.02 there)
+_MOST = 20.0  # of any coefficient
+_ANGLES, _MACHS = Range(-180.0, 180.0, "deg"), Range(0.0, 5.0)
+_FINEST = 1e-4  # steps in degrees and Mach number: finer ones make slopes that no section has
 
 
 class AirfoilTable(eqx.Module):
@@ -59,14 +62,12 @@ def lift_drag(
     """(cl, cd) at angles of attack α (rad, any number of turns) and Mach numbers, elementwise."""
     alpha, mach = jnp.broadcast_arrays(alpha, mach)
     wrapped = alpha - 2 * jnp.pi * jnp.floor((alpha + jnp.pi) / (2 * jnp.pi))
-    i, width_a, basis_a = _hermite(wrapped, table.alpha)
-    j, width_m, basis_m = _hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
+    i, basis_a = _hermite(wrapped, table.alpha)
+    j, basis_m = _hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
     # One gather for the four corners: [*n, corner α, corner M, (cl, cd), order α, order M].
     corner = jnp.arange(2)
     patch = table.nodes[(i[..., None] + corner)[..., :, None], (j[..., None] + corner)[..., None, :]]
-    weight_a = basis_a * jnp.stack([jnp.ones_like(width_a), width_a], -1)[..., None, :]
-    weight_m = basis_m * jnp.stack([jnp.ones_like(width_m), width_m], -1)[..., None, :]
-    weights = weight_a[..., :, None, None, :, None] * weight_m[..., None, :, None, None, :]
+    weights = basis_a[..., :, None, None, :, None] * basis_m[..., None, :, None, None, :]
     cl, cd = jnp.moveaxis(jnp.sum(patch * weights, axis=(-5, -4, -2, -1)), -1, 0)
     if table.prandtl_glauert:
         cl = cl * (1 + (prandtl_glauert_factor(mach) - 1) * _attached(wrapped))
@@ -85,21 +86,27 @@ def airfoil_table(
 ) -> AirfoilTable:
     """Make a table from angles (deg, −180 to 180) [N], Mach numbers [C], and cl, cd [N, C].
 
-    A single Mach number serves for all.
+    A single Mach number serves for all. cl and cd may be traced, so that a section may be differentiated in them.
 
-    Raises InputError where a value is not finite, angles or Mach numbers do not increase, the angles do not run from
-    −180 to 180 with equal values at both ends, a drag is negative, or the shapes do not agree.
+    Raises InputError where a value is not finite or beyond ±20, angles or Mach numbers do not increase, the angles do
+    not run from −180 to 180 with equal values at both ends, a drag is negative, the shapes do not agree, or the
+    Prandtl-Glauert rule would be applied to a table that has Mach effects of its own.
     """
-    alpha_deg, mach = np.asarray(alpha_deg, float), np.atleast_1d(np.asarray(mach, float))
-    cl, cd = (np.asarray(c, float).reshape(len(alpha_deg), -1) for c in (cl, cd))
-    _check_table(name, alpha_deg, mach, cl, cd)
+    alpha_deg = check_list("alpha_deg", alpha_deg, _ANGLES, least=3)
+    mach = check_list("mach", [mach] if np.ndim(mach) == 0 else mach, _MACHS, least=1)
+    cl, cd = (_coefficient(label, c, (alpha_deg.size, mach.size)) for label, c in (("cl", cl), ("cd", cd)))
+    _check_axes(name, alpha_deg, mach, prandtl_glauert)
+    for label, c in (("cl", cl), ("cd", cd)):
+        if known(c):
+            _check_coefficient(name, label, c, alpha_deg, mach)
+    xp = np if known(cl, cd) else jnp
     if mach.size == 1:
-        mach, cl, cd = np.array([0.0, 1.0]), np.repeat(cl, 2, 1), np.repeat(cd, 2, 1)
+        mach, cl, cd = np.array([0.0, 1.0]), xp.repeat(cl, 2, 1), xp.repeat(cd, 2, 1)
     alpha = np.deg2rad(alpha_deg)
     # −π and π are the wrap's own ends; deg2rad may miss them by a rounding.
     alpha[0], alpha[-1] = -np.pi, np.pi
-    nodes = np.stack([_with_slopes(alpha, mach, c) for c in (cl, cd)], axis=2)
-    return AirfoilTable(name, bool(prandtl_glauert), *(jnp.asarray(x, float) for x in (alpha, mach, nodes)))
+    nodes = xp.stack([_with_slopes(alpha, mach, c, xp) for c in (cl, cd)], axis=2)
+    return AirfoilTable(name, bool(prandtl_glauert), *map(array, (alpha, mach, nodes)))
 
 
 def linear_airfoil(slope: float = 2 * np.pi, cd: float = 0.0, zero_lift: float = 0.0) -> AirfoilTable:
@@ -108,24 +115,24 @@ def linear_airfoil(slope: float = 2 * np.pi, cd: float = 0.0, zero_lift: float =
     slope per rad, zero_lift in rad. Beyond 28° the lift falls off to zero at ±180°. Raises InputError where a value is
     not finite.
     """
-    check_number("slope", slope)
-    check_number("cd", cd, 0.0)
-    check_number("zero_lift", zero_lift)
+    check_range("slope", slope, Range(-20.0, 20.0, "per rad"))
+    check_range("cd", cd, Range(0.0, _MOST))
+    check_range("zero_lift", zero_lift, Range(-0.5, 0.5, "rad", hint="degrees go through np.deg2rad"))
+    xp = np if known(slope, cd, zero_lift) else jnp
     alpha_deg = np.array([-180.0, *np.arange(-90, 91, 2.0), 180.0])
-    cl = slope * (np.deg2rad(alpha_deg) - zero_lift)
-    cl = np.where(np.abs(alpha_deg) <= 30, cl, cl * np.clip((90 - np.abs(alpha_deg)) / 60, 0, 1))
-    return airfoil_table(alpha_deg, 0.0, cl, np.full_like(cl, cd), name="linear")
+    fade = np.where(np.abs(alpha_deg) <= 30, 1.0, np.clip((90 - np.abs(alpha_deg)) / 60, 0, 1))
+    cl = slope * (np.deg2rad(alpha_deg) - zero_lift) * fade
+    return airfoil_table(alpha_deg, 0.0, cl, cd * xp.ones_like(cl), name="linear")
 
 
 def _hermite(x, nodes):
-    """Interval index, its width, and the cubic Hermite basis [*n, corner, order] at x."""
+    """Interval index and the cubic Hermite basis [*n, corner, order] at x, that of slopes times the width."""
     i = jnp.clip(jnp.searchsorted(nodes, x, side="right", method="compare_all") - 1, 0, nodes.size - 2)
-    width = nodes[i + 1] - nodes[i]
-    t = (x - nodes[i]) / width
+    start, width = jnp.moveaxis(jnp.stack([nodes[:-1], jnp.diff(nodes)], axis=-1)[i], -1, 0)
+    t = (x - start) / width
     value = t * t * (3 - 2 * t)
-    left = jnp.stack([1 - value, t * (1 - t) ** 2], -1)
-    right = jnp.stack([value, t * t * (t - 1)], -1)
-    return i, width, jnp.stack([left, right], -2)
+    basis = jnp.stack([1 - value, width * t * (1 - t) ** 2, value, width * t * t * (t - 1)], -1)
+    return i, basis.reshape(*basis.shape[:-1], 2, 2)
 
 
 def _attached(alpha):
@@ -134,52 +141,81 @@ def _attached(alpha):
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
-def _with_slopes(alpha: np.ndarray, mach: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Values and node derivatives, [N, C, order α, order M]."""
-    in_alpha, in_mach = _slopes_alpha(alpha, values), _slopes_mach(mach, values)
-    cross = _slopes_mach(mach, in_alpha)
-    return np.stack([np.stack([values, in_mach], -1), np.stack([in_alpha, cross], -1)], -2)
+def _with_slopes(alpha: np.ndarray, mach: np.ndarray, values: Any, xp: Any) -> Any:
+    """Values and node derivatives, [N, C, order α, order M]; xp: numpy, or jax's for traced values."""
+    in_alpha, in_mach = _slopes_alpha(alpha, values, xp), _slopes_mach(mach, values, xp)
+    cross = _slopes_mach(mach, in_alpha, xp)
+    return xp.stack([xp.stack([values, in_mach], -1), xp.stack([in_alpha, cross], -1)], -2)
 
 
-def _slopes_alpha(alpha: np.ndarray, values: np.ndarray) -> np.ndarray:
-    turn, inner = 2 * np.pi, values[:-1]
-    n = len(inner)
-    thrice = np.concatenate([alpha[:-1] - turn, alpha[:-1], alpha[:-1] + turn])
-    slopes = PchipInterpolator(thrice, np.tile(inner, (3, 1)), axis=0).derivative()(thrice[n : 2 * n + 1])
-    return np.asarray(slopes)
+def _slopes_alpha(alpha: np.ndarray, values: Any, xp: Any) -> Any:
+    """Slopes in α [N, C] of a coefficient that goes round: the first row's neighbours are the second and the last."""
+    turn = 2 * np.pi
+    round_ = np.concatenate([[alpha[-2] - turn], alpha, [alpha[1] + turn]])
+    return _inner_slopes(round_, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
 
 
-def _slopes_mach(mach: np.ndarray, values: np.ndarray) -> np.ndarray:
-    slopes = np.array(PchipInterpolator(mach, values, axis=1).derivative()(mach))
-    slopes[:, [0, -1]] = 0.0  # so that the constant beyond the table's ends joins it without a kink
-    return slopes
+def _slopes_mach(mach: np.ndarray, values: Any, xp: Any) -> Any:
+    """Slopes in M [N, C]: zero at the ends, so that the constant beyond them joins the table without a kink."""
+    zero = xp.zeros_like(values[:, :1])
+    return xp.concatenate([zero, _inner_slopes(mach, values.T, xp).T, zero], axis=1)
 
 
-def _check_table(name: str, alpha: np.ndarray, mach: np.ndarray, cl: np.ndarray, cd: np.ndarray) -> None:
+def _inner_slopes(x: np.ndarray, y: Any, xp: Any) -> Any:
+    """Fritsch and Carlson's slopes at all rows but the first and the last, from y [N, C].
+
+    The harmonic mean of the neighbouring intervals' slopes, weighted by their widths (Fritsch & Butland, SIAM J. Sci.
+    Stat. Comput. 5, 1984, Eq. 5); zero where those differ in sign.
+    """
+    width = np.diff(x)[:, None]
+    slope = (y[1:] - y[:-1]) / width
+    before, after = slope[:-1], slope[1:]
+    w_before, w_after = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
+    same = before * after > 0
+    total = w_before / xp.where(same, before, 1.0) + w_after / xp.where(same, after, 1.0)
+    return xp.where(same, (w_before + w_after) / xp.where(same, total, 1.0), 0.0)
+
+
+def _coefficient(label: str, values: Any, shape: tuple[int, int]) -> Any:
+    """cl or cd as an array [N, C]; a traced one stays traced."""
+    try:
+        array = np.asarray(values, float) if known(values) else jnp.asarray(values)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"Argument `{label}` must be numbers of shape {shape} (angle, Mach), but is not") from None
+    if array.size != shape[0] * shape[1] or array.ndim not in (1, 2):
+        raise InputError(f"Argument `{label}` must have shape {shape} (angle, Mach), but has {array.shape}")
+    return array.reshape(shape)
+
+
+def _check_axes(name: str, alpha: np.ndarray, mach: np.ndarray, prandtl_glauert: bool) -> None:
     where = f"Airfoil table {name!r}: "
-    for label, c in (("cl", cl), ("cd", cd)):
-        if c.shape != (alpha.size, mach.size):
-            raise InputError(
-                f"{where}`{label}` must have shape {(alpha.size, mach.size)} (angle, Mach), but has {c.shape}"
-            )
-        bad = np.argwhere(~np.isfinite(c))
-        if bad.size:
-            i, j = bad[0]
-            raise InputError(
-                f"{where}`{label}` must be finite, but is {c[i, j]} at alpha {alpha[i]:g} deg, Mach {mach[j]:g}"
-            )
     for label, x in (("alpha_deg", alpha), ("mach", mach)):
-        bad = np.flatnonzero(~(np.diff(x) > 0))
+        bad = np.flatnonzero(~(np.diff(x) > _FINEST))
         if bad.size:
             i = int(bad[0])
-            raise InputError(f"{where}`{label}` must increase, but {x[i]:g} is followed by {x[i + 1]:g} (row {i + 2})")
-    if alpha.size < 3 or alpha[0] != -180 or alpha[-1] != 180:
+            raise InputError(
+                f"{where}`{label}` must increase in steps above {_FINEST:g}, but {x[i]:g} is followed by {x[i + 1]:g} "
+                f"(row {i + 2})"
+            )
+    if alpha[0] != -180 or alpha[-1] != 180:
         raise InputError(f"{where}`alpha_deg` must run from -180 to 180, but runs from {alpha[0]:g} to {alpha[-1]:g}")
-    if not np.all(np.isfinite(mach)) or mach[0] < 0:
-        raise InputError(f"{where}`mach` must be finite and not negative, but is {mach}")
-    for label, c in (("cl", cl), ("cd", cd)):
-        if not np.allclose(c[0], c[-1], rtol=0, atol=1e-6):
-            raise InputError(f"{where}`{label}` must be the same at -180 and 180 deg, but is {c[0]} and {c[-1]}")
-    if np.any(cd < 0):
-        i, j = np.argwhere(cd < 0)[0]
-        raise InputError(f"{where}`cd` must not be negative, but is {cd[i, j]} at alpha {alpha[i]:g} deg")
+    if prandtl_glauert and (mach.size > 1 or mach[0] > _LOW_SPEED):
+        raise InputError(
+            f"{where}`prandtl_glauert` must be false for a table that has the effect of Mach number in it, but it has "
+            + (f"{mach.size} Mach numbers" if mach.size > 1 else f"the Mach number {mach[0]:g}")
+        )
+
+
+def _check_coefficient(name: str, label: str, c: np.ndarray, alpha: np.ndarray, mach: np.ndarray) -> None:
+    where = f"Airfoil table {name!r}: "
+    least = 0.0 if label == "cd" else -_MOST
+    bad = np.argwhere(~((c >= least) & (c <= _MOST)))
+    if bad.size:
+        i, j = bad[0]
+        rule = "not be negative" if np.isfinite(c[i, j]) and -_MOST < c[i, j] < 0 else f"lie in [{least:g}, {_MOST:g}]"
+        rule = rule if np.isfinite(c[i, j]) else "be finite"
+        raise InputError(
+            f"{where}`{label}` must {rule}, but is {c[i, j]:g} at alpha {alpha[i]:g} deg, Mach {mach[j]:g}"
+        )
+    if not np.allclose(c[0], c[-1], rtol=0, atol=1e-6):
+        raise InputError(f"{where}`{label}` must be the same at -180 and 180 deg, but is {c[0]} and {c[-1]}")

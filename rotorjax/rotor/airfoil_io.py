@@ -1,31 +1,52 @@
-"""Reading and writing airfoil tables: CSV files and C81, the fixed-width format of the rotorcraft codes.
+"""Reading lift and drag of a section from the files that people have: CSV, C81, XFOIL's and AeroDyn's polars.
 
 CSV: lines that start with `#` are comments. The first other line names the columns: `alpha_deg,cl,cd` (more columns are
 ignored) for one Mach number, or `alpha_deg` and the Mach numbers for one coefficient over both. Angles in degrees.
+Columns are separated by commas, or by semicolons, tabs or blanks; with semicolons or tabs a comma is a decimal sign.
 
-C81: a title and six counts, then lift, drag and moment, each with its own angles and Mach numbers, in columns of seven
-characters.
+All files are UTF-8, with or without a byte-order mark. The format is found by the content, C81 by `.c81` too.
 """
 
-from dataclasses import dataclass
+import re
 from pathlib import Path
 
 import numpy as np
 
 from rotorjax.errors import InputError
+from rotorjax.io.reading import read_text
+from rotorjax.rotor.airfoil_text import Coefficient, number, require_increasing, require_lines
+from rotorjax.rotor.c81 import counts_of, read_c81
 
-Coefficient = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""(angles in degrees [N], Mach numbers [C], values [N, C])."""
+Section = tuple[Coefficient, Coefficient]
+"""Lift and drag."""
 
 
-@dataclass(frozen=True)
-class C81:
-    """The content of a C81 file: title, lift, drag and moment, each (angles in deg [N], Mach [C], values [N, C])."""
+def read_section(path: str | Path, drag_path: str | Path | None = None) -> Section:
+    """Read lift and drag, each over its own angles and Mach numbers: from one file, or from one CSV file for each.
 
-    title: str
-    cl: Coefficient
-    cd: Coefficient
-    cm: Coefficient
+    A polar without a Mach number of its own has Mach 0. Raises InputError, naming file and line, where something in
+    them cannot be read.
+    """
+    if drag_path is not None:
+        return read_alpha_mach(path), read_alpha_mach(drag_path)
+    kind = format_of(path)
+    if kind == "C81":
+        content = read_c81(path)
+        return content.cl, content.cd
+    reader = {"XFOIL": _read_xfoil, "AeroDyn": _read_aerodyn, "CSV": lambda path: (*read_polar(path), 0.0)}[kind]
+    alpha, cl, cd, mach = reader(path)
+    at = np.array([mach])
+    return (alpha, at, cl[:, None]), (alpha, at, cd[:, None])
+
+
+def format_of(path: str | Path) -> str:
+    """CSV, C81, XFOIL or AeroDyn, by the first lines. Raises InputError where the file cannot be read."""
+    lines = require_lines(path, read_text(path))[:60]
+    if any("XFOIL" in line or "Calculated polar for" in line for line in lines[:15]):
+        return "XFOIL"
+    if any(re.match(r"\s*\d+\s+NumAlf\b", line) for line in lines) or "AirfoilInfo" in lines[0]:
+        return "AeroDyn"
+    return "C81" if Path(path).suffix.lower() == ".c81" or any(map(counts_of, lines)) else "CSV"
 
 
 def read_polar(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -40,206 +61,94 @@ def read_polar(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def read_alpha_mach(path: str | Path) -> Coefficient:
     """Read a coefficient over angle (deg, rows) and Mach number (columns) from a CSV file. Raises as `read_polar`."""
-    header, rows = _read_csv(path)
+    header, rows, lines = _read_csv(path)
     try:
         mach = np.array([float(c) for c in header[1:]])
     except ValueError:
-        raise InputError(f"{path}: the header must be alpha_deg and Mach numbers, but is {header}") from None
-    if mach.size == 0 or np.any(np.diff(mach) <= 0) or not np.all(np.isfinite(mach)):
+        mach = np.zeros(0)
+    if mach.size == 0 or header[0] != "alpha_deg":
+        raise InputError(f"{path}: the header must be alpha_deg and Mach numbers, but is {header}")
+    if np.any(np.diff(mach) <= 0) or not np.all(np.isfinite(mach)):
         raise InputError(f"{path}: the header's Mach numbers must increase, but are {header[1:]}")
+    require_increasing(path, "alpha_deg", rows[:, 0], lines)
     return rows[:, 0], mach, rows[:, 1:]
 
 
 def read_columns(path: str | Path, names: tuple[str, ...]) -> tuple[np.ndarray, ...]:
-    """Read the named columns, each [N], from a CSV file whose first column increases. Raises as `read_polar` does."""
-    header, rows = _read_csv(path)
+    """Read the named columns, each [N], from a CSV file; the first of them increases. Raises as `read_polar` does."""
+    header, rows, lines = _read_csv(path)
     missing = [c for c in names if c not in header]
     if missing:
         raise InputError(f"{path}: columns must include {', '.join(names)}, but {missing[0]!r} is not among {header}")
-    return tuple(rows[:, header.index(c)] for c in names)
+    columns = tuple(rows[:, header.index(c)] for c in names)
+    require_increasing(path, names[0], columns[0], lines)
+    return columns
 
 
-def mirror(alpha: np.ndarray, cl: np.ndarray, cd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Complete the table of a symmetric section from its angles 0 to 180: cl odd, cd even.
-
-    Raises InputError where the angles do not hold 0 and 180, the lift is not zero there, or a negative angle that is
-    listed contradicts the mirror image.
-    """
-    for angle in (0.0, 180.0):
-        lift = cl[alpha == angle]
-        if lift.size != 1 or lift[0] != 0:
-            raise InputError(f"A symmetric table must hold cl = 0 at {angle:g} deg, but holds {lift.tolist()}")
-    keep = alpha >= 0
-    full = (
-        np.concatenate([-alpha[keep][:0:-1], alpha[keep]]),
-        np.concatenate([-cl[keep][:0:-1], cl[keep]]),
-        np.concatenate([cd[keep][:0:-1], cd[keep]]),
-    )
-    for a, l, d in zip(alpha[~keep], cl[~keep], cd[~keep], strict=True):
-        image = np.isclose(full[0], a)
-        if not (image.any() and np.allclose([full[1][image][0], full[2][image][0]], [l, d], atol=1e-6)):
-            raise InputError(
-                f"A symmetric table must mirror itself, but at {a:g} deg cl, cd = {l:g}, {d:g} has no such image"
-            )
-    return full
-
-
-def extend(inner: Coefficient, alpha: np.ndarray, values: np.ndarray) -> Coefficient:
-    """Continue a coefficient over angle and Mach number by a full-range one (alpha [N], values [N]).
-
-    The full-range values serve every Mach number.     The inner table wins where both have a say. Nothing is blended:
-    the interpolant joins the last inner row to the first outer one.
-    """
-    outside = (alpha < inner[0][0]) | (alpha > inner[0][-1])
-    angles = np.concatenate([inner[0], alpha[outside]])
-    table = np.concatenate([inner[2], np.repeat(values[outside][:, None], inner[1].size, axis=1)])
-    order = np.argsort(angles)
-    return angles[order], inner[1], table[order]
-
-
-def resample(coefficient: Coefficient, alpha: np.ndarray, mach: np.ndarray) -> np.ndarray:
-    """Read a coefficient on other angles and Mach numbers by straight lines, as C81 is read, constant beyond."""
-    along = np.stack([np.interp(alpha, coefficient[0], column) for column in coefficient[2].T], axis=1)
-    return np.stack([np.interp(mach, coefficient[1], row) for row in along])
-
-
-def common_grid(lift: Coefficient, drag: Coefficient) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Put lift and drag on one grid that has every angle and Mach number of either: (alpha, mach, cl, cd)."""
-    alpha, mach = np.union1d(lift[0], drag[0]), np.union1d(lift[1], drag[1])
-    return alpha, mach, resample(lift, alpha, mach), resample(drag, alpha, mach)
-
-
-def c81_tables(content: C81) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Lift and drag of a C81 file on one grid, as `airfoil_table` takes them."""
-    return common_grid(content.cl, content.cd)
-
-
-def read_c81(path: str | Path) -> C81:
-    """Read a C81 file.
-
-    Raises InputError, naming file and line, where it is cut short, ragged, not numeric or not increasing.
-    """
-    lines = _lines(path)
-    head = lines[0]
-    try:
-        counts = [int(head[30 + 2 * k : 32 + 2 * k]) for k in range(6)]
-    except ValueError:
-        raise InputError(f"{path}, line 1: six two-digit counts must follow column 30, but it reads {head!r}") from None
-    if min(counts) < 1:
-        raise InputError(f"{path}, line 1: the six counts must be positive, but are {counts}")
-    reader = _C81Reader(path, lines)
-    tables = [reader.coefficient(n_mach, n_alpha) for n_mach, n_alpha in zip(counts[::2], counts[1::2], strict=True)]
-    return C81(head[:30].strip(), *tables)
-
-
-def write_c81(path: str | Path, content: C81) -> None:
-    """Write a C81 file; a value keeps as many digits as seven characters hold.
-
-    Raises InputError where a table has more than 99 angles or Mach numbers, which the format's two-digit counts cannot
-    say.
-    """
-    tables = (content.cl, content.cd, content.cm)
-    sizes = [n for t in tables for n in (t[1].size, t[0].size)]
-    if max(sizes) > 99:
-        raise InputError(f"A C81 table must have at most 99 angles and Mach numbers, but one has {max(sizes)}")
-    out = [f"{content.title[:30]:<30}" + "".join(f"{n:2d}" for n in sizes)]
-    for alpha, mach, values in tables:
-        out += _c81_rows(" " * 7, mach)
-        for a, row in zip(alpha, values, strict=True):
-            out += _c81_rows(_seven(a), row)
-    Path(path).write_text("\n".join(out) + "\n")
-
-
-class _C81Reader:
-    """Walks the lines of a C81 file, nine numbers a line after a first column of its own."""
-
-    def __init__(self, path: str | Path, lines: list[str]):
-        self.path, self.lines, self.at = path, lines, 1
-
-    def coefficient(self, n_mach: int, n_alpha: int) -> Coefficient:
-        mach = self._row(n_mach, labelled=False)[1]
-        rows = [self._row(n_mach, labelled=True) for _ in range(n_alpha)]
-        alpha = np.array([a for a, _ in rows])
-        for name, x in (("Mach numbers", mach), ("angles", alpha)):
-            if np.any(np.diff(x) <= 0):
-                i = int(np.flatnonzero(np.diff(x) <= 0)[0])
-                raise InputError(
-                    f"{self.path}, line {self.at}: {name} must increase, but {x[i]:g} is followed by {x[i + 1]:g}"
-                )
-        return alpha, mach, np.stack([v for _, v in rows])
-
-    def _row(self, count: int, labelled: bool) -> tuple[float, np.ndarray]:
-        label, values = 0.0, []
-        for start in range(0, count, 9):
-            if self.at >= len(self.lines):
-                raise InputError(
-                    f"{self.path}, line {self.at + 1}: {count} numbers must follow, but the file ends here"
-                )
-            line = self.lines[self.at]
-            if labelled and start == 0:
-                label = self._number(line[:7])
-            values += [self._number(line[7 * k : 7 * k + 7]) for k in range(1, min(9, count - start) + 1)]
-            self.at += 1
-        return label, np.array(values)
-
-    def _number(self, text: str) -> float:
-        return _number(text, f"{self.path}, line {self.at + 1}")
-
-
-def _c81_rows(first: str, values: np.ndarray) -> list[str]:
-    cells = [_seven(v) for v in values]
-    return [(" " * 7 if k else first) + "".join(cells[k : k + 9]) for k in range(0, len(cells), 9)]
-
-
-def _seven(value: float) -> str:
-    """Write a number in seven characters with as many decimals as fit, then without the zeros at its end."""
-    for decimals in range(6, 0, -1):
-        text = f"{value:.{decimals}f}"
-        short = text.replace("0.", ".", 1) if abs(value) < 1 else text
-        if len(short) <= 7:
-            kept = text.rstrip("0")
-            kept += "0" if kept.endswith(".") else ""
-            return "    0.0" if float(kept) == 0 else f"{kept if len(kept) <= 7 else short.rstrip('0'):>7}"
-    raise InputError(f"A C81 value must fit in seven characters, but is {value}")
-
-
-def _read_csv(path: str | Path) -> tuple[list[str], np.ndarray]:
-    """Header and rows [N, columns] of a CSV file whose first column increases."""
-    numbered = [(i, line) for i, line in enumerate(_lines(path), 1) if line.strip() and not line.startswith("#")]
+def _read_csv(path: str | Path) -> tuple[list[str], np.ndarray, list[int]]:
+    """Header, rows [N, columns], and the line of each row."""
+    numbered = [
+        (i, line)
+        for i, line in enumerate(require_lines(path, read_text(path)), 1)
+        if line.strip() and not line.lstrip().startswith("#") and not line.startswith("sep=")
+    ]
     if len(numbered) < 3:
         raise InputError(
             f"{path}: the file must hold a header of column names and two or more rows, but has {len(numbered)} lines"
         )
-    header = [c.strip() for c in numbered[0][1].split(",")]
-    rows: list[list[float]] = []
+    separator = next((s for s in (";", "\t", ",") if s in numbered[0][1]), None)
+    header = [cell.strip('"') for cell in _cells(numbered[0][1], separator)]
+    rows = []
     for i, line in numbered[1:]:
-        cells = line.split(",")
+        cells = _cells(line, separator)
         if len(cells) != len(header):
-            raise InputError(f"{path}, line {i}: a row must have {len(header)} columns, but has {len(cells)}")
-        row = [_number(c, f"{path}, line {i}") for c in cells]
-        if rows and row[0] <= rows[-1][0]:
-            raise InputError(
-                f"{path}, line {i}: {header[0]} must increase, but {rows[-1][0]:g} is followed by {row[0]:g}"
-            )
-        rows.append(row)
-    return header, np.array(rows)
+            hint = ": a decimal comma needs ; between the columns" if len(cells) > len(header) else ""
+            raise InputError(f"{path}, line {i}: a row must have {len(header)} columns, but has {len(cells)}{hint}")
+        rows.append([number(cell, f"{path}, line {i}") for cell in cells])
+    return header, np.array(rows), [i for i, _ in numbered[1:]]
 
 
-def _number(text: str, where: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise InputError(f"{where}: every value must be a finite number, but one is {text.strip()!r}")
-    return number
+def _cells(line: str, separator: str | None) -> list[str]:
+    cells = [cell.strip() for cell in line.split(separator)]
+    return [cell.replace(",", ".") for cell in cells] if separator in (";", "\t") else cells
 
 
-def _lines(path: str | Path) -> list[str]:
-    try:
-        lines = Path(path).read_text().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"File {path} must be a readable text file, but is not: {error}") from None
-    if not lines:
-        raise InputError(f"File {path} must not be empty")
-    return lines
+def _read_xfoil(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Angles, cl, cd and Mach number of a polar that XFOIL saved (PACC)."""
+    lines = require_lines(path, read_text(path))
+    rule = next((i for i, line in enumerate(lines) if i and line.strip() and not line.strip(" -")), None)
+    names = [] if rule is None else lines[rule - 1].lower().split()
+    if rule is None or not {"alpha", "cl", "cd"} <= set(names):
+        raise InputError(f"{path}: an XFOIL polar must have the columns alpha, CL and CD over a rule of dashes")
+    mach = re.search(r"Mach\s*=\s*([\d.]+)", "\n".join(lines[:rule]))
+    rows = _rows_of(path, lines, rule + 1, len(lines), len(names))
+    alpha, cl, cd = (rows[:, names.index(name)] for name in ("alpha", "cl", "cd"))
+    return alpha, cl, cd, number(mach[1], f"{path}: Mach") if mach else 0.0
+
+
+def _read_aerodyn(path: str | Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Angles, cl and cd of an AeroDyn 15 file of one table, whose Mach number it does not give."""
+    lines = require_lines(path, read_text(path))
+    found = [(i, int(m[1])) for i, line in enumerate(lines) if (m := re.match(r"\s*(\d{1,6})\s+NumAlf\b", line))]
+    if len(found) != 1:
+        raise InputError(f"{path}: an AeroDyn file must hold one table (one line NumAlf), but holds {len(found)}")
+    at, count = found[0]
+    first = next((i for i in range(at + 1, len(lines)) if not lines[i].lstrip().startswith("!")), len(lines))
+    rows = _rows_of(path, lines, first, first + count)
+    if len(rows) != count:
+        raise InputError(f"{path}, line {len(lines)}: NumAlf says {count} rows, but the file ends after {len(rows)}")
+    return rows[:, 0], rows[:, 1], rows[:, 2], 0.0
+
+
+def _rows_of(path: str | Path, lines: list[str], first: int, last: int, columns: int | None = None) -> np.ndarray:
+    """Rows of numbers between blanks, at least three each and two in all, angles increasing."""
+    numbered = [(i, line.split()) for i, line in enumerate(lines[first:last], first + 1) if line.strip()]
+    width = columns or (len(numbered[0][1]) if numbered else 3)
+    for i, cells in numbered:
+        if len(cells) != width or width < 3:
+            raise InputError(f"{path}, line {i}: a row must have {max(width, 3)} columns, but has {len(cells)}")
+    if len(numbered) < 2:
+        raise InputError(f"{path}: the polar must have two or more rows, but has {len(numbered)}")
+    rows = np.array([[number(cell, f"{path}, line {i}") for cell in cells] for i, cells in numbered])
+    require_increasing(path, "the angle of attack", rows[:, 0], [i for i, _ in numbered])
+    return rows

@@ -7,10 +7,11 @@ rotor, operating = load("my_rotor.toml")
 from importlib import resources
 from pathlib import Path
 
+from rotorjax.checks import closest, shown
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.rotor.rotor_file import closest, read_rotor
+from rotorjax.rotor.rotor_file import read_rotor
 
 
 def names() -> tuple[str, ...]:
@@ -29,7 +30,8 @@ def load(name_or_path: str | Path) -> tuple[Rotor, OperatingPoint]:
     if name_or_path not in names():
         hint = closest(str(name_or_path), names())
         raise InputError(
-            f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is {name_or_path!r}: {hint}"
+            f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is "
+            f"{shown(name_or_path)}: {hint}"
         )
     return read_rotor(_folder() / f"{name_or_path}.toml")
 

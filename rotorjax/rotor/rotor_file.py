@@ -1,99 +1,95 @@
 """Rotor files: TOML with the tables [rotor], [airfoil], [operating] and, for an articulated blade, [hinge].
 
-A user's own file works as the catalogue's do: rotorjax/rotor/data/uh60.toml shows every key. Paths in it are relative
-to it. Every mistake is refused in one line that names the file, the key, the value and what is allowed.
+A user's own file works as the catalogue's do: rotorjax/rotor/data/uh60.toml shows most keys. Paths in it are relative
+to it. Every mistake is refused in one line that names the file, the key, the value and what is allowed; so is a key
+that would have no effect beside the others. Further keys:
+
+    [rotor]
+    linear_twist_deg = -8.0      # in place of twist_deg: from axis to tip, zero at 0.75 R
+    rotation = "clockwise"       # seen from above; else counter-clockwise. Azimuth counts in the direction of rotation
+    [airfoil]
+    full_range = "flat plate"    # beyond the table's angles, where no full_range_file is at hand
 """
 
-import difflib
-import tomllib
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from rotorjax.checks import Range
 from rotorjax.errors import InputError
+from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
 from rotorjax.operating import OperatingPoint, operating_point
-from rotorjax.rotor import airfoil_io, geometry
+from rotorjax.rotor import geometry
 from rotorjax.rotor.airfoil import AirfoilTable, airfoil_table
+from rotorjax.rotor.airfoil_io import Section, read_columns, read_section
+from rotorjax.rotor.derived import check_rotor
+from rotorjax.rotor.full_range import FLAT_PLATE, completed
+from rotorjax.rotor.geometry import ROTATIONS
 
-# key: (required, type). "table" is a number or {r = [...], value = [...]}; "number" is an int or a float but no bool.
-_KEYS: dict[str, dict[str, tuple[bool, str]]] = {
+_RPM = Range(0.0, 200_000.0, "1/min", above=True, hint='a clockwise rotor has rotation = "clockwise" in [rotor]')
+_LENGTH = Range(0.0, 100.0, "m")
+SCHEMA: Schema = {
     "rotor": {
-        "name": (True, "text"),
-        "blades": (True, "whole number"),
-        "radius": (True, "number"),
-        "root_cutout": (True, "number"),
-        "tip_loss": (False, "number"),
-        "chord": (True, "table"),
-        "twist_deg": (False, "table"),
-        "sweep_deg": (False, "table"),
+        "name": Key("text", required=True),
+        "blades": Key("whole number", Range(1, geometry.MOST_BLADES), required=True),
+        "radius": Key("number", geometry.RADIUS, required=True),
+        "root_cutout": Key("number", Range(0.0, 0.95, "R"), required=True),
+        "tip_loss": Key("number", Range(0.0, 1.0, "R", above=True)),
+        "chord": Key("stations", geometry.CHORD, required=True),
+        "twist_deg": Key("stations", Range(-90.0, 90.0, "deg")),
+        "linear_twist_deg": Key("number", Range(-60.0, 60.0, "deg")),
+        "sweep_deg": Key("stations", Range(-79.0, 79.0, "deg")),
+        "rotation": Key("text", choices=ROTATIONS),
     },
     "airfoil": {
-        "name": (False, "text"),
-        "file": (False, "text"),
-        "lift_file": (False, "text"),
-        "drag_file": (False, "text"),
-        "full_range_file": (False, "text"),
-        "symmetric": (False, "true or false"),
-        "prandtl_glauert": (False, "true or false"),
+        "name": Key("text"),
+        "file": Key("text"),
+        "lift_file": Key("text"),
+        "drag_file": Key("text"),
+        "full_range_file": Key("text"),
+        "full_range": Key("text", choices=(FLAT_PLATE,)),
+        "symmetric": Key("true or false"),
+        "prandtl_glauert": Key("true or false"),
     },
     "operating": {
-        "rpm": (True, "number"),
-        "density": (False, "number"),
-        "sound_speed": (False, "number"),
-        "viscosity": (False, "number"),
-        "collective_deg": (True, "number"),
-        "climb": (False, "number"),
+        "rpm": Key("number", _RPM, required=True),
+        "density": Key("number", Range(1e-3, 2000.0, "kg/m3")),
+        "sound_speed": Key("number", Range(100.0, 3000.0, "m/s")),
+        "viscosity": Key("number", Range(1e-8, 1e-1, "m2/s")),
+        "collective_deg": Key("number", Range(-45.0, 45.0, "deg"), required=True),
+        "climb": Key("number", Range(-200.0, 200.0, "m/s")),
     },
     "hinge": {
-        "offset": (True, "number"),
-        "blade_mass": (True, "number"),
-        "first_moment": (True, "number"),
-        "flap_inertia": (True, "number"),
-        "delta3_deg": (False, "number"),
-        "precone_deg": (False, "number"),
-        "flap_spring": (False, "number"),
-        "lag_spring": (False, "number"),
-        "lag_damper_file": (False, "text"),
-        "lag_damper_arm": (False, "number"),
+        "offset": Key("number", _LENGTH, required=True),
+        "blade_mass": Key("number", Range(0.0, 1e5, "kg", above=True), required=True),
+        "first_moment": Key("number", Range(0.0, 1e7, "kg m", above=True), required=True),
+        "flap_inertia": Key("number", Range(0.0, 1e9, "kg m2", above=True), required=True),
+        "delta3_deg": Key("number", Range(-80.0, 80.0, "deg")),
+        "precone_deg": Key("number", Range(-30.0, 30.0, "deg")),
+        "flap_spring": Key("number", Range(0.0, 1e10, "N m/rad")),
+        "lag_spring": Key("number", Range(0.0, 1e10, "N m/rad")),
+        "lag_damper_file": Key("text"),
+        "lag_damper_arm": Key("number", Range(0.0, 10.0, "m", above=True)),
     },
 }
-_REQUIRED_TABLES = ("rotor", "airfoil", "operating")
+_NAMES = {
+    **{"twist": "[rotor] twist_deg", "sweep": "[rotor] sweep_deg", "omega": "[operating] rpm"},
+    **{"hinge.damper": "[hinge] lag_damper_file", "hinge.damper_arm": "[hinge] lag_damper_arm"},
+}
 
 
 def read_rotor(path: str | Path) -> tuple[geometry.Rotor, OperatingPoint]:
     """Read a rotor and its nominal operating point from a TOML file.
 
     Raises InputError, naming file, key and value, for a file that is not there or not TOML, a key that is missing,
-    misspelt or of the wrong type, a value out of range, or a table that has gaps or does not cover the blade.
+    misspelt, of the wrong type or without effect beside the others, a value out of range, a table that has gaps or does
+    not cover the blade, and a rotor whose solidity or tip Mach number no rotor has.
     """
-    path = Path(path)
-    data = _parse(path)
-    try:
-        return _build(data, path.parent)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+    return read_toml(path, SCHEMA, _build, _NAMES, optional=("hinge",))
 
 
-def closest(word: str, allowed: Iterable[str]) -> str:
-    """`Did you mean …?` where something allowed is close, else the list of what is allowed."""
-    allowed = list(allowed)
-    near = difflib.get_close_matches(word, allowed, n=1)
-    return f"did you mean '{near[0]}'?" if near else "it must be one of " + ", ".join(allowed)
-
-
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text())
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: the file must be readable text, but is not: {error}") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: the file must be TOML, but is not: {error}") from None
-
-
-def _build(data: dict[str, Any], folder: Path) -> tuple[geometry.Rotor, OperatingPoint]:
-    _check_keys(data)
+def _build(data: Tables, folder: Path) -> tuple[geometry.Rotor, OperatingPoint]:
     body, air = data["rotor"], data["operating"]
     rotor = geometry.rotor(
         name=body["name"],
@@ -101,63 +97,32 @@ def _build(data: dict[str, Any], folder: Path) -> tuple[geometry.Rotor, Operatin
         radius=body["radius"],
         root_cutout=body["root_cutout"],
         tip_loss=body.get("tip_loss", 1.0),
-        chord=_stations("chord", body["chord"]),
-        twist=_in_radians(_stations("twist_deg", body.get("twist_deg", 0.0))),
-        sweep=_in_radians(_stations("sweep_deg", body.get("sweep_deg", 0.0))),
+        chord=body["chord"],
+        twist=_in_radians(_twist(body)),
+        sweep=_in_radians(body.get("sweep_deg", 0.0)),
         airfoil=_airfoil(data["airfoil"], folder),
         hinge=_hinge(data["hinge"], folder) if "hinge" in data else None,
+        rotation=body.get("rotation", ROTATIONS[0]),
     )
     optional = {k: air[k] for k in ("density", "sound_speed", "viscosity", "climb") if k in air}
     omega = air["rpm"] * 2 * np.pi / 60
-    return rotor, operating_point(omega, collective=float(np.deg2rad(air["collective_deg"])), **optional)
+    operating = operating_point(omega, collective=float(np.deg2rad(air["collective_deg"])), **optional)
+    check_rotor(rotor, operating)
+    return rotor, operating
 
 
-def _check_keys(data: dict[str, Any]) -> None:
-    for table in data:
-        if table not in _KEYS:
-            raise InputError(f"[{table}] is not a known table: {closest(table, _KEYS)}")
-    for table in _REQUIRED_TABLES:
-        if table not in data:
-            raise InputError(f"table [{table}] is missing; it must hold {', '.join(_KEYS[table])}")
-    for table, values in data.items():
-        if not isinstance(values, dict):
-            raise InputError(f"[{table}] must be a table, but is {values!r}")
-        for key in values:
-            if key not in _KEYS[table]:
-                raise InputError(f"[{table}] has the unknown key '{key}': {closest(key, _KEYS[table])}")
-        for key, (required, kind) in _KEYS[table].items():
-            if required and key not in values:
-                raise InputError(f"[{table}] must have the key '{key}' ({kind}), but it is missing")
-            if key in values:
-                _check_kind(f"[{table}] {key}", values[key], kind)
-
-
-def _check_kind(where: str, value: Any, kind: str) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    right = {
-        "text": isinstance(value, str),
-        "whole number": isinstance(value, int) and not isinstance(value, bool),
-        "number": number and bool(np.isfinite(value)),
-        "true or false": isinstance(value, bool),
-        "table": number or (isinstance(value, dict) and set(value) == {"r", "value"}),
-    }[kind]
-    if not right:
-        words = {
-            "table": "a number or a table of the two lists r and value",
-            "number": "a finite number",
-            "text": "text in quotes",
-            "whole number": "a whole number",
-        }.get(kind, kind)
-        raise InputError(f"{where} must be {words}, but is {value!r}")
-
-
-def _stations(name: str, value: Any) -> Any:
-    if not isinstance(value, dict):
-        return value
-    try:
-        return [float(x) for x in value["r"]], [float(x) for x in value["value"]]
-    except (TypeError, ValueError):
-        raise InputError(f"[rotor] {name} must be two lists of numbers, r and value, but is {value!r}") from None
+def _twist(body: dict[str, Any]) -> Any:
+    given = body.get("twist_deg", 0.0)
+    if "linear_twist_deg" in body:
+        if "twist_deg" in body:
+            raise InputError("[rotor] must have twist_deg or linear_twist_deg, but has both")
+        return [0.0, 1.0], [-0.75 * body["linear_twist_deg"], 0.25 * body["linear_twist_deg"]]
+    if isinstance(given, float) and given != 0:
+        raise InputError(
+            f"[rotor] twist_deg must be a table over the span, but is {given:g}, which only adds to the collective: "
+            f"for {given:g} deg from axis to tip write linear_twist_deg = {given:g} (zero at 0.75 R)"
+        )
+    return given
 
 
 def _in_radians(value: Any) -> Any:
@@ -169,26 +134,18 @@ def _airfoil(section: dict[str, Any], folder: Path) -> AirfoilTable:
     if single == bool(pair) or (pair and len(pair) < 2):
         given = ", ".join(k for k in section if k.endswith("file")) or "neither"
         raise InputError(f"[airfoil] must have either 'file' or both 'lift_file' and 'drag_file', but has {given}")
-    alpha, mach, cl, cd = _single(section, folder) if single else _pair(section, folder)
-    return airfoil_table(alpha, mach, cl, cd, section.get("name", ""), section.get("prandtl_glauert", False))
-
-
-def _single(section: dict[str, Any], folder: Path) -> tuple[np.ndarray, ...]:
-    path = folder / section["file"]
-    if path.suffix.lower() == ".c81":
-        return airfoil_io.c81_tables(airfoil_io.read_c81(path))
-    alpha, cl, cd = airfoil_io.read_polar(path)
-    if section.get("symmetric", False):
-        alpha, cl, cd = airfoil_io.mirror(alpha, cl, cd)
-    return alpha, np.zeros(1), cl[:, None], cd[:, None]
-
-
-def _pair(section: dict[str, Any], folder: Path) -> tuple[np.ndarray, ...]:
-    lift, drag = (airfoil_io.read_alpha_mach(folder / section[k]) for k in ("lift_file", "drag_file"))
+    if "full_range" in section and "full_range_file" in section:
+        raise InputError("[airfoil] must have 'full_range_file' or 'full_range', but has both")
+    paths = [folder / section[k] for k in ("file", "lift_file", "drag_file") if k in section]
+    lift, drag = read_section(*paths)
+    outer: Section | str | None = section.get("full_range")
     if "full_range_file" in section:
-        alpha, cl, cd = airfoil_io.read_polar(folder / section["full_range_file"])
-        lift, drag = airfoil_io.extend(lift, alpha, cl), airfoil_io.extend(drag, alpha, cd)
-    return airfoil_io.common_grid(lift, drag)
+        outer = read_section(folder / section["full_range_file"])
+    alpha, mach, cl, cd = completed(lift, drag, outer, symmetric=section.get("symmetric", False))
+    name = section.get("name", paths[0].stem)
+    if isinstance(outer, str):  # said wherever the section is named
+        name += f", {outer} beyond {lift[0][0] if lift[0][0] < 0 else -lift[0][-1]:g} to {lift[0][-1]:g} deg"
+    return airfoil_table(alpha, mach, cl, cd, name, section.get("prandtl_glauert", False))
 
 
 def _hinge(section: dict[str, Any], folder: Path) -> geometry.Hinge:
@@ -196,11 +153,12 @@ def _hinge(section: dict[str, Any], folder: Path) -> geometry.Hinge:
     angles = {
         k.removesuffix("_deg"): float(np.deg2rad(section[k])) for k in ("delta3_deg", "precone_deg") if k in section
     }
-    damper = (
-        airfoil_io.read_columns(folder / section["lag_damper_file"], ("rate", "force"))
-        if "lag_damper_file" in section
-        else None
-    )
     springs = {k: section[k] for k in ("flap_spring", "lag_spring") if k in section}
-    arm = section.get("lag_damper_arm", 0.0)
-    return geometry.hinge(**numbers, **angles, **springs, damper_arm=arm, damper=damper)
+    given = {"lag_damper_file", "lag_damper_arm"} & set(section)
+    if len(given) == 1:
+        missing = ({"lag_damper_file", "lag_damper_arm"} - given).pop()
+        raise InputError(f"[hinge] {given.pop()} must come with {missing}, without which it has no effect")
+    if not given:
+        return geometry.hinge(**numbers, **angles, **springs)
+    damper = read_columns(folder / section["lag_damper_file"], ("rate", "force"))
+    return geometry.hinge(**numbers, **angles, **springs, damper_arm=section["lag_damper_arm"], damper=damper)

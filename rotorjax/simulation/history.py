@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float
 from scipy.interpolate import PchipInterpolator, PPoly
 
+from rotorjax.checks import check_list, closest
 from rotorjax.errors import InputError
-from rotorjax.rotor.rotor_file import closest
 
 
 class Piecewise(eqx.Module):
@@ -67,15 +67,7 @@ def read_history(
 
 
 def _numbers(name: str, values: object, length: int | None = None) -> Float[np.ndarray, " P"]:
-    try:
-        found = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(f"[history] {name} must be a list of numbers, but is {values!r}") from None
-    if found.ndim != 1 or found.size < 2:
-        raise InputError(f"[history] {name} must be a list of two or more numbers, but is {values!r}")
-    if not np.all(np.isfinite(found)):
-        gap = int(np.flatnonzero(~np.isfinite(found))[0])
-        raise InputError(f"[history] {name} must have no gap, but entry {gap + 1} is {found[gap]}")
+    found = check_list(f"history.{name}", values)
     if length is not None and found.size != length:
         raise InputError(f"[history] {name} must have as many values as t ({length}), but has {found.size}")
     return found

@@ -1,36 +1,24 @@
 """The study itself: solve the cases in order, keep each as it finishes, then write pictures, tables and report."""
 
-from collections.abc import Callable, Sequence
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
-from json import loads
 from pathlib import Path
 from threading import Thread
-from typing import Protocol
 
 import xarray as xr
 from tqdm import tqdm
 
 from rotorjax.bench import wake_file
 from rotorjax.bench.cases import Case, neighbour
+from rotorjax.bench.flapping import flapping_dataset
 from rotorjax.bench.record import add_finite_state
 from rotorjax.bench.schedule import Schedule
-from rotorjax.bench.settings import StudySettings, differences
-from rotorjax.errors import InputError
-from rotorjax.io import netcdf
-from rotorjax.io.atomic import make_folder
-from rotorjax.study.flapping import with_flapping
-from rotorjax.wake.model import FreeWake
-from rotorjax.wake.solution import Solution, rehearse, solve
-
-Progress = Callable[[str, float], None]
-
-
-class Solver(Protocol):
-    """What solves the free wake: rotorjax.wake.solution.solve."""
-
-    def __call__(self, model: FreeWake, start: Solution | None, progress: Progress | None) -> Solution:
-        """Return the periodic wake of `model`."""
-        ...
+from rotorjax.bench.settings import StudySettings
+from rotorjax.bench.single import Progress, Solver, solve_wake
+from rotorjax.study import kept
+from rotorjax.trim.held import let_flap
+from rotorjax.wake.solution import rehearse, solve
 
 
 @dataclass(frozen=True)
@@ -52,11 +40,12 @@ def solve_cases(
 ) -> StudyResult:
     """Solve all cases of a study, keeping each in folder/cases as soon as it is done; what is there is not redone.
 
+    A kept file that is damaged or holds another case is set aside with a line on stderr, and its case solved again.
     show: progress bar. workers: threads. A case that does not converge is kept with its last good state, and no other
     starts from it. Raises InputError where the folder cannot be written or holds another study.
     """
-    kept = make_folder(make_folder(folder) / "cases")
-    found = {case: _reload(kept / f"{case.name}.nc", settings) for case in cases if (kept / f"{case.name}.nc").exists()}
+    folder = Path(folder)
+    found = kept.take_up(folder, cases, settings, lambda line: tqdm.write(line, file=sys.stderr))
     todo = [case for case in cases if case not in found]
     with tqdm(total=len(cases), initial=len(found), desc="study", unit="case", disable=not show) as bar:
 
@@ -68,7 +57,7 @@ def solve_cases(
             return solve_case(case, settings, found | done, progress, solver)
 
         def keep(case: Case, data: xr.Dataset) -> None:
-            netcdf.write(kept / f"{case.name}.nc", data)
+            kept.keep(folder, case, data)
             bar.update(1)
             if not bool(data["converged"]):
                 bar.write(f"{case.label} did not converge: {data.attrs['why']}")
@@ -104,22 +93,10 @@ def solve_case(
     solver: Solver = solve,
 ) -> xr.Dataset:
     """Solve one case with both models, from its nearest converged neighbour among `done` where there is one."""
-    near = neighbour(case, [other for other, data in done.items() if bool(data["converged"])])
-    start = None if near is None else wake_file.to_solution(done[near], settings)
-    solution = solver(wake_file.model_of(case, settings), start, progress)
-    if settings.flapping:
-        data = with_flapping(case, solution, settings, progress)
+    rigid = solve_wake(case, settings, done, progress, solver)
+    if settings.flapping and rigid.converged:
+        freed = let_flap(rigid, progress)
+        data = flapping_dataset(case, rigid, freed.solution, freed.flap, settings)
     else:
-        data = wake_file.to_dataset(case, solution, settings)
+        data = wake_file.to_dataset(case, rigid, settings)
     return add_finite_state(data, settings)
-
-
-def _reload(path: Path, settings: StudySettings) -> xr.Dataset:
-    data = netcdf.read(path)
-    if data.attrs.get("fingerprint") == settings.fingerprint():
-        return data
-    ours, theirs = settings.table(), loads(data.attrs.get("settings", "{}"))
-    what = ", ".join(differences(ours, theirs)[:3]) or "other settings"
-    raise InputError(
-        f"{path.parent.parent}: the output folder must be new or of the same study, but holds one with {what}"
-    )

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from rotorjax.checks import closest
 from rotorjax.errors import InputError
-from rotorjax.rotor.rotor_file import closest
 from rotorjax.validation import (
     caradonna_tung,
     finite_state,
@@ -14,13 +14,14 @@ from rotorjax.validation import (
     landgrebe,
     march,
     momentum,
+    polars,
     step,
 )
 from rotorjax.validation.case import Subject, ValidationCase
 
-_ALL = (caradonna_tung, momentum, landgrebe, ground, finite_state, step, march, heave, inflow_map, grid)
+_ALL = (caradonna_tung, polars, momentum, landgrebe, ground, finite_state, step, march, heave, inflow_map, grid)
 CASES = {module.CASE.name: module.CASE for module in _ALL}
-MEASURED = (caradonna_tung.NAME, inflow_map.NAME)
+MEASURED = (caradonna_tung.NAME, polars.NAME, inflow_map.NAME)
 QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)
 
 

@@ -41,7 +41,7 @@ def points(subject: Subject) -> tuple[Point, ...]:
     """One rotor out of ground effect, over level ground from the highest place down, and on slopes at h = 1."""
     free = subject.hovers(point("uh60"))[0]
     level = [Point(free.rotor, free.collective_deg, h) for h in ((2.0, 1.0) if subject.quick else HEIGHTS)]
-    slopes = [] if subject.quick else [Point(free.rotor, free.collective_deg, 1.0, (), s) for s in SLOPES]
+    slopes = [] if subject.quick else [Point(free.rotor, free.collective_deg, 1.0, slope_deg=s) for s in SLOPES]
     return (free, *level, *slopes)
 
 

@@ -1,23 +1,52 @@
-"""Grid: what C_T changes by from the default to twice the default in panels, ages and free turns."""
+"""Grid: what changes with twice the panels, ages or free turns, in free air, and with twice the turns near ground.
+
+Near the ground it is C_T and mean inflow; over a slope also what the slope alone makes, the first harmonics.
+"""
+
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.bench.plotting import FREE_WAKE, INK, new_figure, style
+from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, style
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
+from rotorjax.validation.measure import first_harmonic
 from rotorjax.validation.point import Point, point
-from rotorjax.validation.row import Against, Row, relative
+from rotorjax.validation.row import Against, Row, between, relative
 from rotorjax.wake.settings import quick_settings, wake_settings
+from rotorjax.wake.solution import Solution
 
 NAME = "grid"
-COARSE = Against("C_T with the settings of all other rows", "the solver's tolerance, 1e-7", "the aim set for this wake")
+COARSE = Against(
+    "the same with the settings of all other rows", "the solver's tolerance, 1e-7", "the aim set for this wake"
+)
 WORDS = {"panels": "panels", "age_step_deg": "age step", "free_turns": "free turns"}
+HEIGHTS, SLOPED = (2.0, 1.5, 1.0, 0.5), 1.0
+SLOPES_DEG = (10.0, 20.0, 30.0)
+THRUST, INFLOW, HARMONIC = 0.007, 0.01, 0.1
+"""Most that C_T, mean inflow and a first harmonic may change by, of themselves."""
 
 
 def points(subject: Subject) -> tuple[Point, ...]:
-    """One rotor in hover with the default wake, and with each number of it refined alone."""
-    (base,) = subject.hovers(point("caradonna_tung"))
-    return (base, *(point(base.rotor, base.collective_deg, None, **{n: v}) for n, v in refined(subject.quick).items()))
+    """All wakes once: each with the default settings, and with one number of them refined."""
+    return tuple(dict.fromkeys(at for base, finer in pairs(subject) for at in (base, finer)))
+
+
+def pairs(subject: Subject) -> list[tuple[Point, Point]]:
+    """Wakes with the default settings beside the same with one number refined; near the ground, where the wake ends."""
+    (free,) = subject.hovers(point("caradonna_tung"))
+    found = [(free, _with(free, n, v)) for n, v in refined(subject.quick).items()]
+    if subject.quick:
+        return found
+    (rotor,) = subject.hovers(point("uh60"))
+    name, turns = "free_turns", refined(False)["free_turns"]
+    grounds = [(None, 0.0), *((h, 0.0) for h in HEIGHTS), *((SLOPED, s) for s in SLOPES_DEG)]
+    near = [Point(rotor.rotor, rotor.collective_deg, h, (), s) for h, s in grounds]
+    return found + [(at, _with(at, name, turns)) for at in near]
+
+
+def _with(at: Point, name: str, value: float) -> Point:
+    return Point(at.rotor, at.collective_deg, at.height, ((name, value),), at.slope_deg)
 
 
 def refined(quick: bool) -> dict[str, float]:
@@ -36,31 +65,62 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
 
 
 def rows(subject: Subject, wakes: Wakes) -> list[Row]:
-    """Change of C_T, each less than 1 %."""
-    base, *finer = points(subject)
-    limits = relative(0.01, wakes[base].CT)
-    found = []
-    for at in finer:
-        name, value = at.changes[0]
-        found.append(Row(NAME, f"C_T with {WORDS[name]} {value:g}, {base.label}", wakes[at].CT, limits, COARSE))
+    """Change of C_T below 0.7 %, of mean inflow below 1 %, of first harmonics over a slope below 10 %."""
+    return [row for pair in pairs(subject) for row in _rows_of(*pair, wakes)]
+
+
+def _rows_of(base: Point, finer: Point, wakes: Wakes) -> list[Row]:
+    before, after = wakes[base], wakes[finer]
+    name, value = finer.changes[0]
+    where = f"with {WORDS[name]} {value:g}, {base.label}"
+    found = [
+        Row(NAME, f"C_T {where}", after.CT, relative(THRUST, before.CT), COARSE),
+        Row(NAME, f"mean inflow {where}", after.mean_inflow, relative(INFLOW, before.mean_inflow), COARSE),
+    ]
+    if base.slope_deg:
+        for of, field in FIRST.items():
+            title = f"change of the first harmonic of {of}, of itself, {where}"
+            found.append(Row(NAME, title, harmonic_change(before, after, field), between(0, HARMONIC), COARSE))
     return found
 
 
+FIRST: dict[str, Callable[[Solution], np.ndarray]] = {"inflow": lambda s: s.inflow, "loading": lambda s: s.dct_dr}
+"""What a slope gives a first harmonic over azimuth."""
+
+
+def harmonic_change(before: Solution, after: Solution, field: Callable[[Solution], np.ndarray]) -> float:
+    """By how much a first harmonic changes, cosine and sine together, over its size before."""
+    one, other = (first_harmonic(s, field(s)) for s in (before, after))
+    return abs(other - one) / abs(one)
+
+
 def draw(subject: Subject, wakes: Wakes) -> Figure:
-    """Change of C_T by each refinement."""
-    base, *finer = points(subject)
-    changes = [100 * (wakes[at].CT / wakes[base].CT - 1) for at in finer]
-    names = [f"{WORDS[at.changes[0][0]]}\n{at.changes[0][1]:g}" for at in finer]
+    """Change of C_T and mean inflow by each refinement; the first harmonic of inflow over slope, with both."""
+    found = pairs(subject)
+    names = [f"{f.label}".replace(", ", "\n", 1) for _, f in found]
     with style():
-        figure = new_figure(5.5, 3.6)
-        axes = figure.add_subplot()
-        axes.axhspan(-1, 1, color=INK, alpha=0.08, lw=0, label="allowed")
-        axes.bar(np.arange(len(finer)), changes, 0.5, color=FREE_WAKE, zorder=3)
+        figure = new_figure(12.0, 4.6)
+        axes, slopes = figure.subplots(1, 2, width_ratios=(3, 1))
+        axes.axhspan(-100 * THRUST, 100 * THRUST, color=INK, alpha=0.08, lw=0, label="allowed, $C_T$")
+        at = np.arange(len(found))
+        for shift, colour, label, of in (
+            (-0.2, FREE_WAKE, r"$C_T$", lambda s: s.CT),
+            (0.2, VPBFSM, "mean inflow", lambda s: s.mean_inflow),
+        ):
+            changes = [100 * (of(wakes[f]) / of(wakes[b]) - 1) for b, f in found]
+            axes.bar(at + shift, changes, 0.4, color=colour, zorder=3, label=label)
         axes.axhline(0, color=INK, lw=0.8)
-        axes.set_xticks(np.arange(len(finer)), names)
-        axes.set(ylabel=r"change of $C_T$, %", title=f"{base.rotor}, {base.collective_deg:g}°")
+        axes.set_xticks(at, names, rotation=60, ha="right", fontsize=6)
+        axes.set(ylabel="change, %")
         axes.legend(loc="best")
+        for k, colour in ((0, FREE_WAKE), (1, VPBFSM)):
+            sloped = [pair[k] for pair in found if pair[0].slope_deg]
+            size = [abs(first_harmonic(wakes[p], wakes[p].inflow)) / wakes[p].mean_inflow for p in sloped]
+            slopes.plot([p.slope_deg for p in sloped], size, "o-", color=colour, label=("default", "refined")[k])
+        slopes.set(xlabel="slope, deg", ylabel="first harmonic of inflow over its mean")
+        slopes.legend(loc="best")
     return figure
 
 
-CASE = ValidationCase(NAME, "Grid", points, compare)
+KNOWN = ""
+CASE = ValidationCase(NAME, "Grid", points, compare, KNOWN)

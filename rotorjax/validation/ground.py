@@ -1,4 +1,8 @@
-"""Level ground: inflow at constant thrust against Hayden and Cheeseman-Bennett, thrust, and where the wake goes."""
+"""Level ground: induced power at constant thrust against the measured curve and Hayden's, thrust, where the wake goes.
+
+What tests near the ground measure is thrust and torque: their ratio v_IGE/v_OGE is that of induced power at the same
+thrust, ∫ λ dC_T over C_T^1.5. The mean inflow at the blades over √C_T, which leaves the loading out, stands beside it.
+"""
 
 from itertools import pairwise
 
@@ -7,22 +11,29 @@ from matplotlib.figure import Figure
 
 from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
 from rotorjax.reference import published as reference
+from rotorjax.rotor import catalogue
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import clearance, tip_path
 from rotorjax.validation.point import Point, point
-from rotorjax.validation.row import Against, Row, above_zero, absolute, between
+from rotorjax.validation.polars import ROTORS
+from rotorjax.validation.row import Against, Limits, Row, above_zero, absolute, between
 from rotorjax.wake.solution import Solution
 
 NAME = "ground"
 HEIGHTS, QUICK = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0), (1.0, 2.0)
-NEAR = 1.0
-"""Height over R up to which the tip vortex has to run out along the ground."""
-FAR_EXCESS = 1 / 0.9926 - 1
-"""By how much Hayden's formula exceeds 1 far from the ground."""
-HAYDEN = Against(
-    "Hayden, AHS 32nd Forum, 1976",
-    "not stated; Cheeseman and Bennett's formula (ARC R&M 3021) beside it",
-    "what the two formulas differ by, and 0.0075 by which Hayden's exceeds 1 far from the ground",
+NEAR = 0.75
+"""Height over R up to which two free turns come to where the tip vortex runs out along the ground."""
+MARGIN = 0.04
+ISOLATED = Against(
+    "isolated model rotors (NACA TN 835 and others, as reduced by Prouty)",
+    "0.005 from reading the mean curve; the scatter of the tests is not in the data used",
+    "the aim set for this wake",
+)
+FUSELAGE = Against(
+    "between isolated model rotors (NACA TN 835 and others, as reduced by Prouty), and Hayden's fit to flight tests of "
+    "helicopters with their fuselage (AHS 32nd Forum, 1976)",
+    "0.005 from reading the first; the second's is not stated",
+    "the two, and the aim set for this wake beyond them",
 )
 RISE = Against("ground effect", "none: a sign", "thrust rises as the ground comes near")
 SOLID = Against("the ground is solid", "none: a sign", "no node may pass through it")
@@ -33,10 +44,16 @@ OUTSIDE = between(1.0, np.inf)
 
 
 def points(subject: Subject) -> tuple[Point, ...]:
-    """One rotor out of ground effect, then from the highest place down."""
-    (free,) = _free(subject)
-    heights = sorted(QUICK if subject.quick else HEIGHTS, reverse=True)
-    return (free, *(Point(free.rotor, free.collective_deg, h) for h in heights))
+    """Each rotor out of ground effect, then from the highest place down."""
+    return tuple(at for free in _free(subject) for at in (free, *_grounded(subject, free)))
+
+
+def _grounded(subject: Subject, free: Point) -> tuple[Point, ...]:
+    """The places of a rotor near the ground, the highest first; the highest of all for the first rotor alone."""
+    heights = QUICK if subject.quick else HEIGHTS
+    if free != _free(subject)[0]:
+        heights = [h for h in heights if reference.isolated_rotors(h) is not None]
+    return tuple(Point(free.rotor, free.collective_deg, h) for h in sorted(heights, reverse=True))
 
 
 def compare(subject: Subject, wakes: Wakes) -> Comparison:
@@ -45,17 +62,25 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
 
 
 def rows(subject: Subject, wakes: Wakes) -> list[Row]:
-    """Inflow ratio at each height, C_T rising all the way down, nodes above the ground, tip vortex along it."""
-    free, *grounded = points(subject)
-    alone = wakes[free]
-    found = [_ratio_row(at, wakes[at], alone) for at in reversed(grounded)]
+    """Power ratio at each height, C_T rising all the way down, nodes above the ground, tip vortex along it."""
+    return [row for free in _free(subject) for row in _rows_of(free, _grounded(subject, free), wakes)]
+
+
+def _rows_of(free: Point, grounded: tuple[Point, ...], wakes: Wakes) -> list[Row]:
+    alone, where = wakes[free], f"{free.rotor} at {free.collective_deg:g}°"
+    found = [_ratio_row(at, wakes[at], alone, where) for at in reversed(grounded) if _limits(at)]
     least = min(b - a for a, b in pairwise([alone.CT, *(wakes[at].CT for at in grounded)]))
     lowest = min(clearance(wakes[at]) for at in grounded)
-    found.append(
-        Row(NAME, "least rise of C_T to the next lower height, constant collective", least, above_zero(), RISE)
-    )
-    found.append(Row(NAME, "height over R of the lowest wake node above the ground", lowest, above_zero(), SOLID))
-    return found + [_spread(at, wakes[at]) for at in reversed(grounded) if _height(at) <= NEAR]
+    rise = "least rise of C_T to the next lower height at constant collective"
+    found.append(Row(NAME, f"{rise}, {where}", least, above_zero(), RISE))
+    solid = "height over R of the lowest wake node above the ground"
+    found.append(Row(NAME, f"{solid}, {where}", lowest, above_zero(), SOLID))
+    return found + [_spread(at, wakes[at], where) for at in reversed(grounded) if _height(at) <= NEAR]
+
+
+def power_ratio(near: Solution, alone: Solution) -> float:
+    """Induced power over C_T^1.5 near the ground over the same far from it: the ratio at constant thrust."""
+    return float(near.CP_induced / near.CT**1.5 / (alone.CP_induced / alone.CT**1.5))
 
 
 def inflow_ratio(near: Solution, alone: Solution) -> float:
@@ -63,17 +88,36 @@ def inflow_ratio(near: Solution, alone: Solution) -> float:
     return float(near.mean_inflow / np.sqrt(near.CT) / (alone.mean_inflow / np.sqrt(alone.CT)))
 
 
-def _ratio_row(at: Point, near: Solution, alone: Solution) -> Row:
-    wanted, other = reference.hayden(_height(at)), reference.cheeseman_bennett(_height(at))
-    name = f"inflow at constant thrust over OGE, h = {_height(at):g} (Cheeseman-Bennett {other:.3f})"
-    return Row(NAME, name, inflow_ratio(near, alone), absolute(abs(wanted - other) + FAR_EXCESS, wanted), HAYDEN)
+def _limits(at: Point) -> Limits | None:
+    """Where the power ratio has to lie: about the measured curve; of a helicopter's rotor, up to Hayden's as well."""
+    measured, flown = reference.isolated_rotors(_height(at)), reference.hayden(_height(at))
+    if measured is None or not flies(at.rotor):
+        return None if measured is None else absolute(MARGIN, measured)
+    low, high = sorted((measured, flown))
+    return Limits(measured, low - MARGIN, high + MARGIN, f"{low:.3f} to {high:.3f}, ±{MARGIN:g}")
 
 
-def _spread(at: Point, solution: Solution) -> Row:
-    ours = float(tip_path(solution).r[-1])
-    return Row(
-        NAME, f"radius over R of the tip vortex at its last free node, h = {_height(at):g}", ours, OUTSIDE, ALONG
-    )
+def flies(rotor: str) -> bool:
+    """Whether a rotor's blades are hinged as a helicopter's are, and not a test stand's."""
+    return catalogue.load(rotor)[0].hinge is not None
+
+
+def _ratio_row(at: Point, near: Solution, alone: Solution, where: str) -> Row:
+    limits, height = _limits(at), _height(at)
+    assert limits is not None
+    beside = {
+        "mean inflow": inflow_ratio(near, alone),
+        "Hayden": reference.hayden(height),
+        "Cheeseman-Bennett": reference.cheeseman_bennett(height),
+    }
+    others = ", ".join(f"{name} {value:.3f}" for name, value in beside.items())
+    name = f"induced power at constant thrust over OGE, h = {height:g}, {where} ({others})"
+    return Row(NAME, name, power_ratio(near, alone), limits, FUSELAGE if flies(at.rotor) else ISOLATED)
+
+
+def _spread(at: Point, solution: Solution, where: str) -> Row:
+    name = f"radius over R of the tip vortex at its last free node, h = {_height(at):g}, {where}"
+    return Row(NAME, name, float(tip_path(solution).r[-1]), OUTSIDE, ALONG)
 
 
 def _height(at: Point) -> float:
@@ -82,39 +126,49 @@ def _height(at: Point) -> float:
 
 
 def draw(subject: Subject, wakes: Wakes) -> Figure:
-    """Inflow ratio and thrust ratio over height, and the tip vortices in the plane through the shaft."""
-    free, *grounded = points(subject)
-    alone = wakes[free]
-    heights = np.array([at.height for at in grounded], float)
-    fine = np.linspace(min(heights.min(), 0.5), max(heights.max(), 3.0), 100)
+    """Power ratio and thrust ratio of each rotor over height, and the first one's tip vortices."""
+    fine = np.linspace(0.5, 3.0, 101)
     with style():
         figure = new_figure(11.0, 3.8)
-        inflow, thrust, paths = figure.subplots(1, 3, width_ratios=(1, 1, 1.3))
-        ours = [inflow_ratio(wakes[at], alone) for at in grounded]
-        inflow.plot(heights, ours, "o-", color=FREE_WAKE, label="free wake")
-        inflow.plot(fine, [reference.hayden(h) for h in fine], color=VPBFSM, label="Hayden")
+        power, thrust, paths = figure.subplots(1, 3, width_ratios=(1, 1, 1.3))
+        for free, marker in zip(_free(subject), "os^", strict=False):
+            grounded, alone = _grounded(subject, free), wakes[free]
+            heights = [_height(at) for at in grounded]
+            look = {"marker": marker, "color": FREE_WAKE, "label": f"free wake, {free.rotor}"}
+            power.plot(heights, [power_ratio(wakes[at], alone) for at in grounded], **look)
+            thrust.plot(heights, [wakes[at].CT / alone.CT for at in grounded], **look)
+        measured = fine[[reference.isolated_rotors(h) is not None for h in fine]]
+        power.plot(measured, [reference.isolated_rotors(h) for h in measured], color=VPBFSM, label="isolated rotors")
+        power.plot(fine, [reference.hayden(h) for h in fine], color=VPBFSM, ls=":", label="Hayden, with fuselage")
         other = [reference.cheeseman_bennett(h) for h in fine]
-        inflow.plot(fine, other, color=INK, ls="--", label="Cheeseman & Bennett")
-        inflow.set(xlabel=r"$h/R$", ylabel="mean inflow at constant thrust over OGE")
-        inflow.legend(loc="lower right")
-        thrust.plot(heights, [wakes[at].CT / alone.CT for at in grounded], "o-", color=FREE_WAKE)
+        power.plot(fine, other, color=INK, ls="--", label="Cheeseman & Bennett")
+        power.set(xlabel=r"$h/R$", ylabel="induced power at constant thrust over OGE")
+        power.legend(loc="lower right")
         thrust.axhline(1, color=INK, lw=0.8)
         thrust.set(xlabel=r"$h/R$", ylabel=r"$C_T$ over OGE, constant collective")
+        grounded = _grounded(subject, _free(subject)[0])
         for at, colour in zip(grounded, series_colours(len(grounded)), strict=True):
             path = tip_path(wakes[at])
-            paths.plot(path.r, path.z + at.height, color=colour, label=f"h = {at.height:g}")
+            paths.plot(path.r, path.z + _height(at), color=colour, label=f"h = {at.height:g}")
         paths.axhline(0, color=INK, lw=1.2)
-        paths.set(xlabel=r"$r/R$", ylabel="height above ground over R", title="tip vortices")
+        paths.set(
+            xlabel=r"$r/R$", ylabel="height above ground over R", title=f"tip vortices, {_free(subject)[0].rotor}"
+        )
         paths.legend(loc="best")
     return figure
 
 
 def _free(subject: Subject) -> tuple[Point, ...]:
-    return subject.hovers(point("caradonna_tung", 8.0) if subject.quick else point("uh60"))
+    if subject.quick:
+        return subject.hovers(point("caradonna_tung", 8.0))
+    return subject.hovers(point("uh60"), *(point(rotor, 8.0) for rotor in ROTORS.values()))
 
 
 KNOWN = (
-    "At h = 1 the tip vortex has contracted and runs out again, but its two free turns end before it has passed the "
-    "rim; the turns that repeat the last one go on from there."
+    "At h = 0.75 and below the ground takes too much: at h = 0.5 induced power falls to 0.50 to 0.60 where isolated "
+    "rotors have 0.72, Hayden 0.625 and Cheeseman and Bennett 0.650. The free turns are a part of it at h = 1 (grid "
+    "case: 1 % of C_T) and none above. Most likely it is the inner sheet: in an earlier trial three or four inboard "
+    "filaments in place of two had a mean inflow over √C_T of 0.71 and 0.79 at h = 0.5 and 0.75, but most such wakes "
+    "were lost on the way down (docs/free_wake.md). Two blades at h = 1 are out by 0.003."
 )
 CASE = ValidationCase(NAME, "Level ground", points, compare, KNOWN)

@@ -143,12 +143,11 @@ def _phase_row(name: str, z: Each[complex]) -> Row:
 
 
 def _slopes_differ(height: float) -> float:
-    """Share by which the two formulas' slopes over height differ, of Hayden's."""
-    step = 1e-4
-    one, other = (
-        (f(height + step) - f(height - step)) / (2 * step) for f in (reference.hayden, reference.cheeseman_bennett)
-    )
-    return abs(one - other) / abs(one)
+    """Share by which the slopes of what is known of ground effect over height differ, of their mean."""
+    step = 0.1  # as far apart as the measured curve's points
+    known = (reference.hayden, reference.cheeseman_bennett, reference.isolated_rotors)
+    slopes = [f(height + step) - f(height - step) for f in known]
+    return float(np.ptp(slopes) / np.mean(slopes))
 
 
 LOOKS: Each[dict[str, Any]] = Each(

@@ -16,11 +16,12 @@ from rotorjax.validation.row import Against, Row, absolute, relative
 NAME, SOURCE = "landgrebe", "Landgrebe, J. AHS 17(4), 1972"
 AGES_DEG = (90, 180, 270, 360, 540)
 MISSES = "what the fit itself misses Caradonna and Tung's measured tip vortex by"
+"""The fit's scatter about the rotors that it was made from is not in the data used: one rotor's share of it is."""
 
 
 def points(subject: Subject) -> tuple[Point, ...]:
-    """The UH-60 and Caradonna and Tung's rotor in hover."""
-    return subject.hovers(point("uh60"), point("caradonna_tung"))
+    """The UH-60 and Knight and Hefner's rotors; Caradonna and Tung's has its own measurement."""
+    return subject.hovers(point("uh60"), point("knight_hefner_2"), point("knight_hefner_4"))
 
 
 def misses() -> tuple[float, float]:
@@ -82,7 +83,7 @@ def _fit(at: Point, wakes: Wakes, age: np.ndarray) -> Path:
 
 
 KNOWN = (
-    "Beyond the first blade passage the tip vortex descends too slowly, as it does against Caradonna and Tung's own "
-    "measurement: one shortfall, seen twice."
+    "Beyond the first blade passage all tip vortices descend by about a fifth less than the fit has it. So does the "
+    "one rotor measured here, by 14 % (Caradonna and Tung's), and from that measurement ours differs by 5 %."
 )
 CASE = ValidationCase(NAME, "Landgrebe's tip vortex", points, compare, KNOWN)

@@ -55,6 +55,18 @@ def disk_inflow(solution: Solution, azimuths: int = 48) -> float:
     return float(inflow.mean(axis=0) @ area)
 
 
+def first_harmonic(
+    solution: Solution, values: Float[np.ndarray, "K R"], inner: float = 0.3, outer: float = 0.9
+) -> complex:
+    """First harmonic over azimuth of what is given at the blades, area mean over r from `inner` to `outer`.
+
+    Twice the mean of values · exp(iψ): the real part goes with cos ψ, the imaginary one with sin ψ.
+    """
+    weights = np.where((solution.r > inner) & (solution.r < outer), solution.r * solution.widths, 0.0)
+    over_azimuth = 2 * np.mean(values * np.exp(1j * solution.psi)[:, None], axis=0)
+    return complex(over_azimuth @ weights / weights.sum())
+
+
 def clearance(solution: Solution) -> float:
     """Height over R of the lowest wake node above the ground; inf without ground."""
     ground = solution.model.ground

@@ -12,7 +12,8 @@ from rotorjax.wake.model import FreeWake, free_wake
 
 @dataclass(frozen=True)
 class Point:
-    """One wake in hover. rotor: name or file. collective_deg. height: over R, None out of ground effect. slope_deg.
+    """One wake in hover. rotor: name or file. collective_deg. height: over R, None out of ground effect. slope_deg: of
+    the ground.
 
     changes: settings of the wake that differ from the default, as (name, value).
     """
@@ -27,7 +28,7 @@ class Point:
     def label(self) -> str:
         """Name for readers."""
         place = "OGE" if self.height is None else f"h = {self.height:g}"
-        place += f", δ = {self.slope_deg:g}°" if self.slope_deg else ""
+        place += f", {self.slope_deg:g}° of slope" if self.slope_deg else ""
         more = "".join(f", {name} {value:g}" for name, value in self.changes)
         return f"{self.rotor} {self.collective_deg:g}°, {place}{more}"
 
@@ -52,14 +53,18 @@ def point(rotor: str, collective_deg: float | None = None, height: float | None 
 def needed(task: Point, tasks: Sequence[Point]) -> Point | None:
     """The wake that `task` starts from: among those before it with its rotor and settings, the nearest."""
     before = [p for p in tasks[: tasks.index(task)] if p.rotor == task.rotor and p.changes == task.changes]
-    before = [p for p in before if p.height is None or (task.height is not None and p.height >= task.height)]
-    before = [p for p in before if p.height != task.height or p.slope_deg < task.slope_deg or p.height is None]
+    before = [p for p in before if p.height is None or _is_further(p, task)]
 
-    def distance(p: Point) -> tuple[float, float, float]:
+    def distance(p: Point) -> tuple[float, float]:
         far = 10.0 if p.height is None and task.height is not None else abs((p.height or 0) - (task.height or 0))
-        return abs(p.collective_deg - task.collective_deg), far, abs(p.slope_deg - task.slope_deg)
+        return abs(p.collective_deg - task.collective_deg), far + (task.slope_deg - p.slope_deg) / 90
 
     return min(before, key=distance, default=None)
+
+
+def _is_further(p: Point, task: Point) -> bool:
+    """Whether p's ground is at least as far away as the task's, and no steeper."""
+    return None not in (p.height, task.height) and p.height >= task.height and p.slope_deg <= task.slope_deg  # type: ignore[operator]
 
 
 def twist_of(rotor: str) -> float:

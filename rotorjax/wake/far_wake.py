@@ -1,6 +1,5 @@
 """The far filaments beyond their free part: closure, fading and cores."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -8,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, component
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.vortex_core import core_radius
 
@@ -54,25 +53,28 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
 
     Out of ground effect the turn moves on by its own pitch, and with the wind. Over ground it comes down at a speed
     that goes as tanh(z/REACH), so at a steady one far above the plane and as in a stagnation flow next to it, and its
-    radius grows so that the flow through it is kept. As h → ∞ the second becomes the first. A wake cut off without
-    closure expands and bunches at its end and pulls the inflow at the disk with it.
+    radius grows so that the flow through it is kept. A jet that meets the plane aslant keeps what moves it along the
+    plane: it comes down along the shaft and runs off downhill, and the stagnation point lies uphill. As h → ∞ all this
+    becomes the first. A wake cut off without closure expands and bunches at its end and pulls the inflow at the disk
+    with it.
     """
     turn = model.settings.steps_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
     drift = along = jnp.zeros(3, nodes.dtype)
     if model.flight is not None:
-        along = model.flight.wind.at[2].set(0.0)
+        along = model.flight.wind * np.array([1.0, 1.0, 0.0])
         drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
+    # all repeats at once, (F, repeats, N, 3)
+    after = np.array(repeats(model).after)[:, None]
     if model.ground is None:
         pitch = jnp.mean(last[..., 2] - before[..., 2], axis=1)
-        down = jnp.stack([jnp.zeros_like(pitch), jnp.zeros_like(pitch), pitch], axis=-1)[:, None] + drift
-        return _laid_out(model, lambda k: last + k * down)
+        down = pitch[:, None] * np.array([0.0, 0.0, 1.0]) + drift
+        return _in_line(model, last[:, None] + after[..., None] * down[:, None, None])
     plane = model.ground
     # heights do not depend on the frame, so only the foot and the normal have to be turned into the blade's
     normal = rotate_about_shaft(plane.normal, -psi)
     # where the shaft meets the plane, which a hub that has turned sees elsewhere than under its height
-    zero = jnp.zeros_like(plane.height)
-    foot = jnp.stack([zero, zero, -plane.height * jnp.cos(plane.slope) / normal[2]])
+    foot = -plane.height * jnp.cos(plane.slope) / normal[2] * np.array([0.0, 0.0, 1.0])
     height = _heights(last, normal, plane)
     flat = last - height[..., None] * normal - foot
     if model.flight is not None:
@@ -81,25 +83,24 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
         share = (along @ along) / (along @ along + STILL**2)
         foot = foot + share * jnp.mean(flat, axis=1, keepdims=True)
         flat = last - height[..., None] * normal - foot
+    foot = jnp.broadcast_to(foot, (len(last), 1, 3))[:, None]
     x = height / REACH
-    mean, mean_before = jnp.mean(height, axis=1), jnp.mean(_heights(before, normal, plane), axis=1)
     # what ln sinh x falls by in a turn is the same for every turn
-    step = (_log_sinh(mean_before / REACH) - _log_sinh(mean / REACH))[:, None]
+    mean, mean_before = jnp.mean(x, axis=1), jnp.mean(_heights(before, normal, plane), axis=1) / REACH
+    fall = after * (_log_sinh(mean_before) - _log_sinh(mean))[:, None, None]
+    lower = _lowered(x[:, None], fall)
+    wider = jnp.exp(0.5 * (fall + _log_cosh(lower) - _log_cosh(x)[:, None]))
+    downhill = normal - np.array([0.0, 0.0, 1.0]) / normal[2]
+    run = REACH * _along(x[:, None], lower)[..., None] * downhill
+    spread = (flat[:, None] + run) * wider[..., None] + REACH * lower[..., None] * normal
+    return _in_line(model, foot + after[..., None] * drift + spread)
 
-    def repeat(k: float) -> Float[Array, "F N 3"]:
-        lower = _lowered(x, k * step)
-        wider = jnp.exp(0.5 * (k * step + _log_cosh(lower) - _log_cosh(x)))
-        return foot + k * drift + flat * wider[..., None] + REACH * lower[..., None] * normal
 
-    return _laid_out(model, repeat)
-
-
-def _laid_out(model: FreeWake, repeat: Callable[[float], Float[Array, "F N 3"]]) -> Float[Array, "F C 3"]:
-    """The repeated turns one behind the other; a turn that goes on where the one before ends leaves out its start."""
-    return jnp.concatenate(
-        [repeat(k)[:, 0 if w > 1 else 1 :] for k, w in zip(*repeats(model), strict=True)],
-        axis=1,
-    )
+def _in_line(model: FreeWake, turns: Float[Array, "F K N 3"]) -> Float[Array, "F C 3"]:
+    """Repeated turns one behind the other; a turn that goes on where the one before ends leaves out its start."""
+    ones = model.settings.closure_turns
+    parts = turns[:, :ones, 1:], turns[:, ones:]
+    return jnp.concatenate([p.reshape(len(p), -1, 3) for p in parts], axis=1)
 
 
 def _lowered(x: Float[Array, "*n"], fall: Float[Array, "*n"]) -> Float[Array, "*n"]:
@@ -108,22 +109,46 @@ def _lowered(x: Float[Array, "*n"], fall: Float[Array, "*n"]) -> Float[Array, "*
     Odd in x, so a node that a search puts under the plane is no accident; sinh must not overflow high above it.
     """
     high = x > HIGH
-    log = jnp.where(high, x - jnp.log(2.0) - fall, 0.0)
-    from_high = jnp.where(log > HIGH, log + jnp.log(2.0), jnp.arcsinh(jnp.exp(jnp.minimum(log, HIGH))))
+    log = jnp.where(high, x - np.log(2.0) - fall, 0.0)
+    from_high = jnp.where(log > HIGH, log + np.log(2.0), jnp.arcsinh(jnp.exp(jnp.minimum(log, HIGH))))
     return jnp.where(high, from_high, jnp.arcsinh(jnp.sinh(jnp.where(high, 0.0, x)) * jnp.exp(-fall)))
 
 
+def _along(x: Float[Array, "*n"], lower: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """How far a uniform flow of speed 1 along the plane carries what falls from x to `lower` as dx/dt = −tanh x does.
+
+    In place of before it, that is over the widening √(tanh x/tanh lower): ∫ √(tanh y/tanh x)⁻¹ dt along the way, with
+    ∫ dy/√tanh y = artanh √tanh y + arctan √tanh y.
+    """
+    return (_slow_down(x) - _slow_down(lower)) / _root(x)
+
+
+def _slow_down(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    root = _root(x)
+    # artanh u as ½ ln((1 + u)² (1 + u²)/(1 − u⁴)), and 1 − tanh² = cosh⁻²
+    return jnp.log1p(root) + 0.5 * jnp.log1p(root**2) + _log_cosh(_lifted(x)) + jnp.arctan(root)
+
+
+def _root(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    return jnp.sqrt(jnp.tanh(_lifted(x)))
+
+
+def _lifted(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """x, smoothly kept above LEAST."""
+    return 0.5 * (x + jnp.sqrt(x**2 + (2 * LEAST / REACH) ** 2))
+
+
 def _log_sinh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    x = 0.5 * (x + jnp.sqrt(x**2 + (2 * LEAST / REACH) ** 2))
+    x = _lifted(x)
     return x + jnp.log(-0.5 * jnp.expm1(-2 * x))
 
 
 def _log_cosh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    return jnp.logaddexp(x, -x) - jnp.log(2.0)
+    return jnp.logaddexp(x, -x) - np.log(2.0)
 
 
 def _heights(nodes: Float[Array, "*n 3"], normal: Float[Array, "3"], plane: Plane) -> Float[Array, "*n"]:
-    return nodes @ normal + plane.height * jnp.cos(plane.slope)
+    return component(nodes, normal) + plane.height * jnp.cos(plane.slope)
 
 
 def _steps(model: FreeWake) -> tuple[Float[np.ndarray, " S"], Float[np.ndarray, " S"]]:
@@ -163,8 +188,8 @@ def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray,
     settings = model.settings
     turns = (age - settings.filament_ages[0]) / (2 * np.pi)
     left = jnp.exp(-settings.inboard_decay * turns)
-    arms = (jnp.asarray(settings.inboard, float) / settings.release) ** 2
-    tip = strength[0] + settings.impulse_kept * (arms @ ((1 - left) * strength[1:]))
+    arms = (np.array(settings.inboard)[:, None] / settings.release) ** 2
+    tip = strength[0] + settings.impulse_kept * jnp.sum(arms * (1 - left) * strength[1:], axis=0)
     return jnp.concatenate([tip[None], left * strength[1:]])
 
 

@@ -17,10 +17,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import geometry
+from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, wake_settings
 
@@ -150,10 +152,12 @@ def free_wake(
 ) -> FreeWake:
     """Make the model of a rotor's free wake, in or out of ground effect.
 
-    Raises InputError where the rotor climbs over ground, or azimuths is no multiple of the number of blades.
+    Everything but shapes may be traced. Raises InputError where the rotor climbs over ground, its solidity or tip Mach
+    number is beyond sense, or azimuths is no multiple of the number of blades.
     """
-    settings = wake_settings() if settings is None else settings
-    if ground is not None and float(operating.climb) != 0:
+    settings = (wake_settings() if settings is None else settings).for_blades(rotor.blades)
+    check_rotor(rotor, operating)
+    if ground is not None and known(operating.climb) and float(operating.climb) != 0:
         raise InputError(
             f"Argument `operating` must not climb over ground (a steady state needs a fixed height), "
             f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
@@ -163,7 +167,7 @@ def free_wake(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
             f"but has {settings.azimuths}"
         )
-    return FreeWake(rotor, operating, ground, settings, jnp.zeros(()))
+    return FreeWake(rotor, operating, ground, settings, array(0.0))
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:

@@ -1,37 +1,111 @@
-"""The periodic wake as a function of the model that can be differentiated.
+"""The periodic wake as a function of its model, for jax to differentiate, batch and compile.
 
-solution = solve(model)
-thrust = lambda m: performance(m, evaluate(m, periodic_wake(solution, m))).thrust
-slope = equinox.filter_grad(thrust)(model)      # by every number of the model: pitch, twist, height, cores …
+The search for a wake runs on the host, with numbers (solution.py). What it finds moves with the model so that it stays
+periodic (implicit function theorem, ode/implicit.py), and everything that is read off it moves along.
 """
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
 
+from rotorjax.checks import known
 from rotorjax.errors import InputError
 from rotorjax.ode.implicit import attach
-from rotorjax.wake.equilibrium import Unknowns, residual
+from rotorjax.wake import solution as on_host
+from rotorjax.wake.equilibrium import Unknowns, residual, spread
 from rotorjax.wake.model import FreeWake
-from rotorjax.wake.preconditioner import harmonic_inverse
-from rotorjax.wake.solution import Solution
+from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
+from rotorjax.wake.search import Progress
+from rotorjax.wake.solution import Solution, readings
+from rotorjax.wake.start import laid_level
+
+
+def solve(
+    model: FreeWake, start: Solution | None = None, progress: Progress | None = None, tol: float = 1e-7
+) -> Solution:
+    """Find the periodic wake of a model; `solution.solve`, under jax.grad, jacfwd, vmap and jit too.
+
+    Arguments, and what comes back without tracing: as `solution.solve`. Under tracing every array of the solution has
+    its derivative by every number of the model, at the cost of one linear solve for each direction (reverse: for each
+    output); batches are solved one after the other; under jit the search is a call to the host.
+
+    Raises InputError under tracing where the search does not converge, since then there is nothing to differentiate
+    (under jit: a runtime error with the same words).
+    """
+    if known(model):
+        return on_host.solve(model, start, progress, tol)
+    fixed = jax.lax.stop_gradient(model)
+    slices = 1 if _stays_level(model) else model.settings.azimuths
+    if known(fixed):
+        x = jax.tree.map(jnp.asarray, _found(fixed, start, progress, tol, slices))
+    else:
+        numbers, rest = eqx.partition(fixed, eqx.is_array)
+        x = jax.pure_callback(
+            lambda numbers: _found(eqx.combine(numbers, rest), start, None, tol, slices),
+            _shapes(model, slices),
+            numbers,
+            vmap_method="sequential",
+        )
+    return readings(model, _attached(x, model))
 
 
 def periodic_wake(solution: Solution, model: FreeWake) -> Unknowns:
     """The converged wake, with its derivative by every number of the model (implicit function theorem).
 
     Its value is the solution's, whatever the model: give the solution's own. The derivative is one product with the
-    inverse Jacobian, which is assembled once (preconditioner.py), in forward and in reverse mode.
-
-    Raises InputError where the solution did not converge, or its wake is not axisymmetric (a slope).
+    inverse Jacobian, which is assembled once (preconditioner.py), in forward and in reverse mode; over a slope a few
+    tens of preconditioned products. Raises InputError where the solution did not converge.
     """
     if not solution.converged:
         raise InputError(f"Argument `solution` must be converged to have a derivative, but: {solution.why}")
-    x = solution.unknowns
-    if x.near.shape[0] != 1:
-        raise InputError(
-            f"Argument `solution` must be axisymmetric (level ground or none), but has {x.near.shape[0]} azimuths: "
-            "over a slope use rotorjax.ode.implicit.attach(residual, x, model, method='gmres')"
-        )
+    x = jax.tree.map(jnp.asarray, solution.unknowns)
+    if x.near.shape[0] > 1:
+        return _attached(x, model)
     with jax.ensure_compile_time_eval():  # the solution is at hand: nothing of this belongs into the caller's program
-        inverse = jnp.real(harmonic_inverse(solution.model, x, 1).inverse[0])
-    return attach(residual, jax.tree.map(jnp.asarray, x), model, inverse=inverse, refinements=0)
+        inverse = _axisymmetric(x, solution.model)
+    return attach(residual, x, model, inverse=inverse, refinements=0)
+
+
+def _attached(x: Unknowns, model: FreeWake) -> Unknowns:
+    """Unknowns that move with the model."""
+    if x.near.shape[0] == 1:
+        return attach(residual, x, model, inverse=_axisymmetric, refinements=0)
+    return attach(residual, x, model, method="gmres", precondition=_over_a_slope)
+
+
+def _axisymmetric(x: Unknowns, model: FreeWake) -> Float[Array, "n n"]:
+    """Inverse Jacobian of an axisymmetric wake."""
+    return jnp.real(harmonic_inverse(model, x, 1).inverse[0])
+
+
+def _over_a_slope(x: Unknowns, model: FreeWake) -> HarmonicInverse:
+    """Inverse Jacobian of a wake over level ground like this one: with it GMRES needs a few tens of products."""
+    assert model.ground is not None
+    level = eqx.tree_at(lambda m: m.ground.slope, model, jnp.zeros_like(model.ground.slope))
+    return harmonic_inverse(level, laid_level(x, model.ground), x.near.shape[0])
+
+
+def _stays_level(model: FreeWake) -> bool:
+    """Whether the ground is level, or none, and is not asked how it tilts."""
+    return model.ground is None or (known(model.ground.slope) and float(model.ground.slope) == 0)
+
+
+def _found(model: FreeWake, start: Solution | None, progress: Progress | None, tol: float, slices: int) -> Unknowns:
+    """The unknowns of a converged search, of K slices. Raises InputError where it does not converge."""
+    with jax.ensure_compile_time_eval():  # numbers all the way, whatever traces are open around this
+        found = on_host.solve(jax.tree.map(jnp.asarray, model), start, progress, tol)
+    if not found.converged:
+        raise InputError(
+            f"Argument `model` must have a periodic wake that is found, to be traced, but the search ended: {found.why}"
+        )
+    return jax.tree.map(np.asarray, spread(found.unknowns, slices))
+
+
+def _shapes(model: FreeWake, slices: int) -> Unknowns:
+    """Shapes of the unknowns of K slices."""
+    s, dtype = model.settings, jnp.result_type(float)
+    near, far = (slices, s.panels + 1, s.near_ages, 3), (slices, s.filaments, s.far_ages, 3)
+    shapes = (near, far, (slices, s.panels))
+    return Unknowns(*(jax.ShapeDtypeStruct(shape, dtype) for shape in shapes))  # type: ignore[arg-type]

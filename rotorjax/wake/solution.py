@@ -7,26 +7,31 @@ Each step is a few Newton–Krylov iterations on the residual of equilibrium.py.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading
 from rotorjax.wake.clock import Clock
-from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, spread, transported
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, look, spread
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, over_distant_ground
 from rotorjax.wake.start import prescribed
 
+Number = Numbers = Any  # of numpy, or traced by jax
+
 
 @dataclass(frozen=True)
 class Solution:
-    """A periodic wake and the rotor in it. Lengths over R, velocities over ΩR, ψ in rad; arrays are numpy's.
+    """A periodic wake and the rotor in it. Lengths over R, velocities over ΩR, ψ in rad; arrays are numpy's and
+    numbers floats, but under tracing (sensitivity.py), where both are jax's.
 
     model, state: the state belongs to this model; where `converged` is False it is the last point reached, with
     whatever washout or ground it had. why: one sentence. residual: rms distance that nodes move when the wake is passed
@@ -43,24 +48,24 @@ class Solution:
     state: WakeState
     converged: bool
     why: str
-    residual: float
-    load_change: float
+    residual: Number
+    load_change: Number
     iterations: int
     wall_time_s: float
     compile_time_s: float
-    r: np.ndarray
-    widths: np.ndarray
-    psi: np.ndarray
-    dct_dr: np.ndarray
-    inflow: np.ndarray
-    circulation: np.ndarray
-    CT: float
-    CP: float
-    CP_induced: float
-    CP_profile: float
-    mean_inflow: float
-    tip_vortex: np.ndarray
-    tip_vortex_age: np.ndarray
+    r: Numbers
+    widths: Numbers
+    psi: Numbers
+    dct_dr: Numbers
+    inflow: Numbers
+    circulation: Numbers
+    CT: Number
+    CP: Number
+    CP_induced: Number
+    CP_profile: Number
+    mean_inflow: Number
+    tip_vortex: Numbers
+    tip_vortex_age: Numbers
     residuals: tuple[float, ...] = ()
 
     @property
@@ -74,11 +79,16 @@ class Solution:
         plane = self.model.ground
         if plane is None:
             return None
-        r, psi = np.meshgrid(np.linspace(0.1, 2.0, 12), np.linspace(0, 2 * np.pi, 16, endpoint=False))
-        flat = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
-        points = flat - plane.distance(flat)[:, None] * plane.normal
-        through = _velocity(self.state, points, self.model) @ plane.normal
-        return float(jnp.sqrt(jnp.mean(through**2)) / np.sqrt(abs(self.CT) / 2))
+        return float(_through_the_ground(self.state, self.model)) / float(np.sqrt(abs(self.CT) / 2))
+
+
+ARRAYS = ("r", "widths", "psi", "dct_dr", "inflow", "circulation", "tip_vortex")
+NUMBERS = ("CT", "CP", "CP_induced", "CP_profile", "mean_inflow")
+jax.tree_util.register_dataclass(
+    Solution,
+    data_fields=["model", "state", "residual", "load_change", *ARRAYS, "tip_vortex_age", *NUMBERS],
+    meta_fields=["converged", "why", "iterations", "wall_time_s", "compile_time_s", "residuals"],
+)
 
 
 def solve(
@@ -109,15 +119,15 @@ def solve(
     if search.ok:
         slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
         if x.near.shape[0] > slices:
-            x = jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), x)
-        here, x = search.move(here, model, spread(x, slices), "to the case")
+            x = jax.tree.map(lambda a: np.mean(a, axis=0, keepdims=True), x)
+        here, x = search.move(here, model, _spread(x, slices), "to the case")
     return read(here, x, search, clock)
 
 
 def rehearse(model: FreeWake) -> Solution:
     """Compile what `solve` runs on a case of this kind, on a prescribed wake that solves nothing and is returned."""
     slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
-    x = spread(prescribed(model), slices)
+    x = _spread(prescribed(model), slices)
     search = Search(tol=0.0, progress=None, ok=False, why="a rehearsal")
     search.prepare(model, x)
     search.newton(model, x, 0.0, effort=1)
@@ -133,41 +143,82 @@ def _fits(start: Solution, model: FreeWake) -> bool:
 
 
 def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
-    """Evaluate the wake that a search ended with, and collect what a user wants of it."""
-    found: Evaluation = evaluated(model, x)
-    moved = transported(model, found)
-    once_more = evaluated(model, moved)
-    now, then = performance(model, found), performance(model, once_more)
-    tip = jnp.concatenate([found.start.points[:, :1], found.state.far[:, 0]], axis=1)
-    psi = azimuths(found.state)
-    settings = model.settings
-    solution = Solution(
-        model=model,
-        state=found.state,
+    """Evaluate the wake that a search ended with, and collect what a user wants of it, as numbers."""
+    model = jax.tree.map(jnp.asarray, model)  # a search reckons with numpy's, which do not go into a traced function
+    change, evaluation = look(model, x)
+    moved = jax.tree.map(lambda a, b: np.asarray(a) + np.asarray(b), x, change)
+    then = _read_off(model, look(model, moved)[1])["CT"]
+    found = readings(model, x, evaluation)
+    numbers: dict[str, Any] = {n: np.asarray(getattr(found, n)) for n in ARRAYS} | {
+        n: float(getattr(found, n)) for n in NUMBERS
+    }
+    wall, compiling = clock.read()
+    return replace(
+        found,
+        **numbers,
         converged=search.ok,
         why=search.why,
-        residual=displacement(jax.tree.map(lambda a, b: a - b, moved, x)),
-        load_change=abs(float(then.thrust / now.thrust) - 1),
+        residual=displacement(change),
+        load_change=abs(float(then) / numbers["CT"] - 1),
         iterations=search.iterations,
+        residuals=tuple(search.residuals),
+        wall_time_s=wall,
+        compile_time_s=compiling,
+    )
+
+
+def readings(model: FreeWake, x: Unknowns, found: Evaluation | None = None) -> Solution:
+    """What can be read off a converged periodic wake, as functions of model and wake: for jax to differentiate.
+
+    found: the wake's evaluation, where it is at hand.
+    """
+    found = evaluated(model, x) if found is None else found
+    read: dict[str, Any] = _read_off(model, found)
+    return Solution(
+        model=model,
+        state=found.state,
+        converged=True,
+        why="converged",
+        residual=0.0,
+        load_change=0.0,
+        iterations=0,
         wall_time_s=0.0,
         compile_time_s=0.0,
-        r=np.asarray(model.stations),
-        widths=np.asarray(model.widths),
-        psi=np.asarray(psi),
-        dct_dr=np.asarray(disk_loading(model.rotor, found.loads)),
-        inflow=-np.asarray(found.velocities.control[..., 2]),
-        circulation=np.asarray(found.loads.circulation),
-        CT=float(now.thrust),
-        CP=float(now.power),
-        CP_induced=float(now.induced),
-        CP_profile=float(now.profile),
-        mean_inflow=float(now.mean_inflow),
-        tip_vortex=np.asarray(rotate_about_shaft(tip, psi[:, None])),
-        tip_vortex_age=settings.filament_ages,
-        residuals=tuple(search.residuals),
+        tip_vortex_age=model.settings.filament_ages,
+        **read,
     )
-    wall, compiling = clock.read()
-    return replace(solution, wall_time_s=wall, compile_time_s=compiling)
 
 
-_velocity = eqx.filter_jit(velocity)
+@eqx.filter_jit
+def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
+    """Fields of a solution: along blades and vortices, and of the whole rotor."""
+    psi, now = azimuths(found.state), performance(model, found)
+    tip = jnp.concatenate([found.start.points[:, :1], found.state.far[:, 0]], axis=1)
+    return {
+        "r": model.stations,
+        "widths": model.widths,
+        "psi": psi,
+        "dct_dr": disk_loading(model.rotor, found.loads),
+        "inflow": -found.velocities.control[..., 2],
+        "circulation": found.loads.circulation,
+        "tip_vortex": rotate_about_shaft(tip, psi[:, None]),
+        "CT": now.thrust,
+        "CP": now.power,
+        "CP_induced": now.induced,
+        "CP_profile": now.profile,
+        "mean_inflow": now.mean_inflow,
+    }
+
+
+@eqx.filter_jit
+def _through_the_ground(state: WakeState, model: FreeWake) -> Float[Array, ""]:
+    """Rms velocity through the plane within 2 R of the shaft."""
+    plane = model.ground
+    assert plane is not None
+    r, psi = np.meshgrid(np.linspace(0.1, 2.0, 12), np.linspace(0, 2 * np.pi, 16, endpoint=False))
+    flat = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
+    points = flat - plane.distance(flat)[:, None] * plane.normal
+    return jnp.sqrt(jnp.mean((velocity(state, points, model) @ plane.normal) ** 2))
+
+
+_spread = eqx.filter_jit(spread)

@@ -57,12 +57,16 @@ CHANGES = {
     r"\[parameters\] must hold radius, length": ('set = "hayden"', 'set = "freewake"'),
     "must hold radius, clearance, but holds radius, q": ("clearance = ", "q = "),
     "must hold radius, clearance, but holds radius, q, cl": ("clearance = ", "q = 1.0\nclearance = "),
-    r"`radius` must lie in \[0.5, 1\], but is 5": ("radius = 0.7125", "radius = 5.0"),
-    "`radius` must be a finite number, but is nan": ("radius = 0.7125", "radius = nan"),
-    "`radius` must be a finite number, but is 'x'": ("radius = 0.7125", 'radius = "x"'),
-    "lacks converged": ("converged = true\n", ""),
-    "must hold .calibration. and .parameters.": ("[parameters]", "[parametres]"),
-    "cannot be read": ("[parameters]", "[parameters"),
+    r"\[parameters\] radius must be a number in \[0.5, 1\], but is 5": ("radius = 0.7125", "radius = 5.0"),
+    r"\[parameters\] radius must be a finite number, but is nan": ("radius = 0.7125", "radius = nan"),
+    r"\[parameters\] radius must be a finite number, but is 'x'": ("radius = 0.7125", 'radius = "x"'),
+    "must have the key 'converged'": ("converged = true\n", ""),
+    "did you mean 'parameters'": ("[parameters]", "[parametres]"),
+    "must be TOML, but is not": ("[parameters]", "[parameters"),
+    "converged must be true or false, but is 'no'": ("converged = true", 'converged = "no"'),
+    r"rms_error must be a finite number of at least 0, but is nan": ("rms_error = 0.00355", "rms_error = nan"),
+    r"\[foo\] is not a known table": ("[parameters]", "[foo]\nx = 1\n[parameters]"),
+    r"set must be text in quotes, but is \['hayden'\]": ('set = "hayden"', 'set = ["hayden"]'),
 }
 
 

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rotorjax.calibration import hayden, taught
+from rotorjax.calibration import taught
 from rotorjax.ground import Plane, plane
 from rotorjax.potential import (
     contraction,
@@ -36,6 +36,7 @@ from rotorjax.potential.contraction import Contraction
 from rotorjax.potential.ground_source import Correction, DiskQuadrature
 from rotorjax.potential.model import FiniteState, finite_state_model
 from rotorjax.potential.modes import ground_modes, rotor_modes
+from rotorjax.reference import published
 
 ROTOR, SOURCES = rotor_modes(1, 2), ground_modes(1, 2)
 PAIRS = ((0, 1), (0, 2), (1, 2), (1, 3))
@@ -401,8 +402,8 @@ RUNGS = [
         },
     ),
     Rung(
-        ("hayden.hayden_factor",),
-        lambda v: hayden.hayden_factor(v),
+        ("published.hayden_factor",),
+        lambda v: published.hayden_factor(v),
         {"ordinary": ([1.0], True), "high": ([30.0], True)},
     ),
 ]

@@ -9,7 +9,8 @@ import pytest
 from rotorjax.calibration import measured_run
 from rotorjax.calibration.calibration_file import load
 from rotorjax.calibration.measured import PARAMETERS, measurements, with_values
-from rotorjax.calibration.measured_run import MeasuredRun, _fit, _Wake, record, report, write
+from rotorjax.calibration.measured_run import MeasuredRun, _fit, _Wake, record, report
+from rotorjax.calibration.output import write
 from rotorjax.cli import main
 from rotorjax.errors import InputError
 from rotorjax.rotor.catalogue import load as rotor

@@ -203,11 +203,11 @@ def gap(row, column, value):
         ({"cd": gap(2, 1, -0.1)}, "`cd` must not be negative, but is -0.1 at alpha 0 deg"),
         ({"cl": gap(0, 0, 0.5)}, "`cl` must be the same at -180 and 180 deg"),
         ({"cl": np.zeros((5, 3))}, r"`cl` must have shape \(5, 2\)"),
-        ({"alpha_deg": [-180, 10, 0, 20, 180]}, r"`alpha_deg` must increase, but 10 is followed by 0 \(row 3\)"),
+        ({"alpha_deg": [-180, 10, 0, 20, 180]}, r"`alpha_deg` must increase .*, but 10 is followed by 0 \(row 3\)"),
         ({"alpha_deg": [-32, -10, 0, 10, 32]}, "`alpha_deg` must run from -180 to 180, but runs from -32 to 32"),
-        ({"alpha_deg": [-180, -10, np.nan, 10, 180]}, "`alpha_deg` must increase"),
+        ({"alpha_deg": [-180, -10, np.nan, 10, 180]}, "`alpha_deg` must be .* but is nan at entry 3"),
         ({"mach": [0.5, 0.0]}, "`mach` must increase"),
-        ({"mach": [-0.5, 0.0]}, "`mach` must be finite and not negative"),
+        ({"mach": [-0.5, 0.0]}, r"`mach` must be a number in \[0, 5\] throughout"),
     ],
 )
 def test_refuses(changes, text):

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.rotor import airfoil_io, catalogue, geometry
+from rotorjax.rotor import airfoil_io, c81, catalogue, geometry
 from rotorjax.rotor.airfoil import lift_drag
 
 
 def test_names():
-    assert catalogue.names() == ("caradonna_tung", "elliott_althoff", "uh60")
+    assert catalogue.names() == ("caradonna_tung", "elliott_althoff", "knight_hefner_2", "knight_hefner_4", "uh60")
 
 
 def test_uh60_is_the_papers_table_1():
@@ -52,6 +52,16 @@ def test_elliott_althoff_flies_at_its_reported_advance_ratio():
     np.testing.assert_allclose(28.50 / point.tip_speed(rotor.radius), 0.15, atol=5e-4)
     twist = geometry.twist(rotor, jnp.array([0.0, 0.75, 1.0]))
     np.testing.assert_allclose(jnp.rad2deg(twist), [6, 0, -2], atol=1e-12)
+
+
+def test_knight_and_hefners_section_has_the_reported_lift_slope_and_least_drag():
+    table = catalogue.load("knight_hefner_2")[0].airfoil
+    angle = jnp.deg2rad(jnp.linspace(0.0, 6.0, 25))
+    lift, drag = lift_drag(table, angle, jnp.zeros_like(angle))
+    assert float(jnp.sum(angle * lift) / jnp.sum(angle**2)) == pytest.approx(5.75, rel=0.03)
+    assert float(jnp.min(drag)) == pytest.approx(0.0113, abs=2e-4)
+    highest = jnp.max(lift_drag(table, jnp.deg2rad(jnp.linspace(6.0, 16.0, 81)), jnp.zeros(81))[0])
+    assert float(highest) == pytest.approx(0.93, abs=0.02)
 
 
 OWN = """
@@ -96,7 +106,7 @@ def test_own_file(folder):
 def test_own_file_with_a_c81_table(folder):
     alpha, cl, cd = airfoil_io.read_polar(folder / "mine.csv")
     table = [(alpha, np.zeros(1), c[:, None]) for c in (cl, cd, 0 * cl)]
-    airfoil_io.write_c81(folder / "mine.c81", airfoil_io.C81("mine", *table))
+    c81.write_c81(folder / "mine.c81", c81.C81("mine", *table))
     rotor, _ = catalogue.load(write(folder, OWN.replace("mine.csv", "mine.c81")))
     np.testing.assert_allclose(lift_drag(rotor.airfoil, jnp.deg2rad(10.0), jnp.asarray(0.3)), [1, 0.01], atol=1e-13)
 
@@ -109,17 +119,17 @@ def test_own_file_with_a_c81_table(folder):
         ("[operating]", "[operatng]", r"\[operatng\] is not a known table: did you mean 'operating'\?"),
         ("[rotor]", "[zzz]\n[rotor]", r"\[zzz\] is not a known table: it must be one of rotor, airfoil"),
         ("blades = 2", "blades = 2.0", r"\[rotor\] blades must be a whole number, but is 2.0"),
-        ("blades = 2", "blades = -2", "Argument `blades` must be a whole number of at least 1, but is -2"),
-        ("radius = 1.5", "radius = nan", r"\[rotor\] radius must be a finite number, but is nan"),
+        ("blades = 2", "blades = -2", r"\[rotor\] blades must be a whole number from 1 to 20, but is -2"),
+        ("radius = 1.5", "radius = nan", r"\[rotor\] radius must be a number in \[0.02, 200\] m, but is nan"),
         ("radius = 1.5", 'radius = "1.5"', r"\[rotor\] radius must be a finite number, but is '1.5'"),
         ("chord = 0.1", "chord = [0.1, 0.1]", r"\[rotor\] chord must be a number or a table of the two lists r and"),
-        ("[4.0, -4.0]", "[4.0, -4.0, 1]", "Argument `twist` must hold as many values as stations"),
-        ("[4.0, -4.0]", '["a", 1]', r"\[rotor\] twist_deg must be two lists of numbers"),
-        ("[0.1, 1.0]", "[0.1, 0.9]", r"Argument `twist.r` must cover 0.1 to 1 \(r/R\), but is 0.1 to 0.9"),
-        ("[0.1, 1.0]", "[1.0, 0.1]", "Argument `twist.r` must increase from root to tip, but is 1 followed by 0.1"),
-        ("rpm = 600", "rpm = 0", "Argument `omega` must be a finite number above 0, but is 0"),
+        ("[4.0, -4.0]", "[4.0, -4.0, 1]", r"\[rotor\] twist_deg must hold as many values as stations"),
+        ("[4.0, -4.0]", '["a", 1]', r"\[rotor\] twist_deg.value must be a list of numbers"),
+        ("[0.1, 1.0]", "[0.1, 0.9]", r"\[rotor\] twist_deg.r must cover 0.1 to 1 \(r/R\), but is 0.1 to 0.9"),
+        ("[0.1, 1.0]", "[1.0, 0.1]", r"\[rotor\] twist_deg.r must increase from root to tip, but is 1 followed by 0.1"),
+        ("rpm = 600", "rpm = 0", r"\[operating\] rpm must be a number in \(0, 200000\] 1/min, but is 0$"),
         ("rpm = 600", "rpm = true", r"\[operating\] rpm must be a finite number, but is True"),
-        ('file = "mine.csv"', 'file = "other.csv"', "other.csv must be a readable text file"),
+        ('file = "mine.csv"', 'file = "other.csv"', "other.csv: the file must be readable"),
         ('file = "mine.csv"', "", r"\[airfoil\] must have either 'file' or both 'lift_file' and 'drag_file'"),
         ('file = "mine.csv"', 'lift_file = "a"', r"\[airfoil\] must have either .* but has lift_file"),
         ('file = "mine.csv"', 'file = "mine.csv"\nsymmetric = 1', r"symmetric must be true or false, but is 1"),
@@ -138,7 +148,7 @@ def test_own_file_refuses(folder, old, new, message):
     ("name", "message"),
     [
         ("uh-60", "must be a rotor of the catalogue or a .toml file, but is 'uh-60': did you mean 'uh60'?"),
-        ("xyzzy", "it must be one of caradonna_tung, elliott_althoff, uh60"),
+        ("xyzzy", "it must be one of caradonna_tung, elliott_althoff, knight_hefner_2, knight_hefner_4, uh60"),
         (None, "but is None"),
     ],
 )
@@ -149,5 +159,5 @@ def test_unknown_name(name, message):
 
 
 def test_file_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="the file must be readable text"):
+    with pytest.raises(InputError, match="the file must be readable"):
         catalogue.load(tmp_path / "none.toml")

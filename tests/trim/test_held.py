@@ -10,11 +10,11 @@ from wakes import COARSE
 
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import combine
+from rotorjax.bench.flapping import flap_harmonics_deg, flapping_dataset
 from rotorjax.bench.record import summary_entry
 from rotorjax.bench.settings import study_settings
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.flap_lag import blade_of, flap_frequency
-from rotorjax.study.flapping import flap_harmonics_deg, with_flapping
 from rotorjax.study.reading import Reading
 from rotorjax.study.report import flapping_table
 from rotorjax.trim.held import let_flap
@@ -60,7 +60,8 @@ def test_a_stiff_spring_makes_them_rigid(rigid):
 @pytest.mark.slow
 def test_the_study_keeps_both(rigid):
     settings = study_settings(flapping=True, **COARSE, azimuths=4)
-    data = with_flapping(Case(), rigid, settings)
+    freed = let_flap(rigid)
+    data = flapping_dataset(Case(), rigid, freed.solution, freed.flap, settings)
     assert float(data["rigid_CT"]) == rigid.CT
     assert 3.0 < flap_harmonics_deg(data)[0] < 4.5
     entry = summary_entry(data, None)["flapping"]

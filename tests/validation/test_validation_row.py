@@ -54,10 +54,38 @@ def test_the_measurements_are_those_of_the_report():
     assert np.all(np.diff(path.z) <= 0)
 
 
+def test_cheeseman_and_bennetts_ratio_at_constant_thrust_is_theirs_at_constant_power():
+    """What lifts T∞ with a power far away lifts T with it near the ground: P ∝ k T^1.5, so k = (T∞/T)^1.5."""
+    for height in (0.5, 1.0, 2.0):
+        at_constant_power = 1 / (1 - 1 / (16 * height**2))
+        assert reference.cheeseman_bennett(height) * at_constant_power**1.5 == pytest.approx(1)
+
+
+def test_the_measured_ground_effect_is_the_curves_and_ends_with_it():
+    assert [reference.isolated_rotors(h) for h in (0.5, 1.0, 1.5, 2.0)] == [0.72, 0.848, 0.925, 0.972]
+    assert reference.isolated_rotors(0.75) == pytest.approx(0.7925)
+    assert reference.isolated_rotors(3.0) is None
+
+
+@pytest.mark.parametrize(("blades", "solidity_"), [(2, 0.0424), (4, 0.0849)])
+def test_knight_and_hefners_polars_are_those_of_the_catalogues_rotors(blades, solidity_):
+    polar = reference.knight_hefner(blades)
+    body, operating = load(f"knight_hefner_{blades}")
+    assert body.blades == blades
+    assert float(solidity(body)) == pytest.approx(solidity_, abs=1e-4)
+    reynolds = operating.tip_speed(body.radius) * body.chord(1.0) / operating.viscosity
+    assert float(reynolds) == pytest.approx(242000, rel=2e-3)
+    assert np.all(np.diff(polar.thrust) > 0)
+    assert np.all(np.diff(polar.torque) > 0)
+    at8 = list(polar.pitch_deg).index(8)
+    measured = {2: 0.5304, 4: 0.5281}[blades]  # as the report has it
+    assert reference.figure_of_merit(polar.thrust[at8], polar.torque[at8]) == pytest.approx(measured, abs=1e-3)
+
+
 def test_references_have_their_limits():
     assert reference.induced_power_factor(0.006, 0.006**1.5 / np.sqrt(2)) == pytest.approx(1)
     assert reference.cheeseman_bennett(100.0) == pytest.approx(1, abs=1e-5)
-    assert reference.cheeseman_bennett(0.5) == 0.75
+    assert reference.cheeseman_bennett(0.5) == pytest.approx(0.75**1.5)
     assert reference.hayden(1.0) == pytest.approx(1 / (0.9926 + 0.0379 * 4))
     path = reference.landgrebe(np.array([0.0, 100.0]), 0.005, 0.1, 0.0, 2)
     np.testing.assert_allclose(path.r, [1.0, 0.78])

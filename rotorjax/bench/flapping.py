@@ -1,4 +1,4 @@
-"""A case of the study with blades that flap, beside the rigid ones it starts from."""
+"""A case with blades that flap as a data set, beside the rigid blades it started from."""
 
 from dataclasses import replace
 
@@ -8,8 +8,6 @@ import xarray as xr
 from rotorjax.bench import wake_file
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
-from rotorjax.trim.held import Flapped, let_flap
-from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution
 
 RIGID = {
@@ -19,17 +17,16 @@ RIGID = {
 }
 
 
-def with_flapping(case: Case, rigid: Solution, settings: StudySettings, progress: Progress | None = None) -> xr.Dataset:
-    """Pack a solution with its blades freed, where it converged; numbers of the rigid blades go along.
+def flapping_dataset(
+    case: Case, rigid: Solution, freed: Solution, flap: np.ndarray, settings: StudySettings
+) -> xr.Dataset:
+    """Pack a solution with freed blades and their flap angles (K,) in rad; numbers of the rigid blades go along.
 
     The wake's state stays that of the rigid blades, from which a neighbouring case starts.
     """
-    if not rigid.converged:
-        return wake_file.to_dataset(case, rigid, settings)
-    flapped: Flapped = let_flap(rigid, progress)
-    data = wake_file.to_dataset(case, replace(flapped.solution, state=rigid.state), settings)
+    data = wake_file.to_dataset(case, replace(freed, state=rigid.state), settings)
     about = "flap angle of the blade at this azimuth in rad, up positive"
-    data["flap"] = ("azimuth", flapped.flap, {"units": "rad", "long_name": about})
+    data["flap"] = ("azimuth", flap, {"units": "rad", "long_name": about})
     climb = {"mean_inflow": settings.climb_ratio}
     for name, (attribute, about) in RIGID.items():
         value = getattr(rigid, attribute) - climb.get(attribute, 0.0)

@@ -1,5 +1,6 @@
-"""Films of a flight."""
+"""Films: animated GIF files."""
 
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,7 +9,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
-from rotorjax.io.atomic import whole_file
+from rotorjax.io.atomic import write_bytes
 
 
 def write_film(
@@ -18,7 +19,10 @@ def write_film(
     size: tuple[float, float],
     frames_per_second: int = 15,
 ) -> None:
-    """Write a whole GIF. build: puts everything into an empty figure and returns what draws one frame by number."""
+    """Write a whole GIF. build: puts everything into an empty figure and returns what draws one frame by number.
+
+    Raises InputError where it cannot be written.
+    """
     with mpl.rc_context({**plotting.STYLE, "figure.dpi": 80}):  # type: ignore[arg-type]
         figure = plotting.new_figure(*size)
         draw = build(figure)
@@ -31,5 +35,7 @@ def write_film(
             return []
 
         film = FuncAnimation(figure, again, frames=frames, blit=False)
-        with whole_file(path) as temporary:
-            film.save(temporary, writer=PillowWriter(fps=frames_per_second))
+        with tempfile.TemporaryDirectory(prefix="rotorjax-") as folder:  # matplotlib writes films to paths only
+            made = Path(folder) / "film.gif"
+            film.save(made, writer=PillowWriter(fps=frames_per_second))
+            write_bytes(path, made.read_bytes())

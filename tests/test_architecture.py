@@ -1,0 +1,85 @@
+"""The house: three floors, arrows down only. Every import counts, local and for type checking too."""
+
+import ast
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).parent.parent / "rotorjax"
+FLOORS = (  # from the ground up; a room may import from lower floors, and from earlier rooms of its own
+    ("errors", "checks", "frames", "io"),
+    ("ground", "region", "operating", "ode"),
+    ("rotor", "potential"),
+    ("inflow", "wake", "reference"),
+    ("limits",),
+    ("coupled_wake", "coupled"),
+    ("bench",),
+    ("trim", "linearisation", "calibration", "simulation", "deck"),
+    ("study", "validation"),
+    ("commands",),
+    ("cli",),
+)
+ROOMS = [room for floor in FLOORS for room in floor]
+
+
+def module_of(path: Path) -> str:
+    return ".".join(("rotorjax", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def room_of(module: str) -> str:
+    return module.split(".")[1]
+
+
+def named(path: Path) -> set[str]:
+    """Everything that a file imports, by its full name, wherever in the file it does so."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return found
+
+
+@cache
+def imports() -> dict[str, set[str]]:
+    """Modules of the package and the modules of the package that they import."""
+    paths = {module_of(path): path for path in PACKAGE.rglob("*.py")}
+
+    def module(name: str) -> str | None:
+        return name if name in paths else (head if (head := name.rpartition(".")[0]) in paths else None)
+
+    return {m: {t for n in named(path) if (t := module(n)) and t not in ("rotorjax", m)} for m, path in paths.items()}
+
+
+def arrows(room: str) -> set[str]:
+    """Rooms that a room imports from."""
+    files = [m for m in imports() if m != "rotorjax" and room_of(m) == room]
+    return {room_of(target) for m in files for target in imports()[m]} - {room}
+
+
+def test_every_room_has_its_floor():
+    assert {room_of(m) for m in imports() if m != "rotorjax"} == set(ROOMS)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_arrows_point_down(room):
+    """An import of a later room, by any of its files, is an arrow up."""
+    allowed = set(ROOMS[: ROOMS.index(room)])
+    assert arrows(room) <= allowed
+
+
+def test_the_potential_and_the_wake_do_not_know_each_other():
+    assert "wake" not in arrows("potential")
+    assert "potential" not in arrows("wake")
+
+
+def test_what_ode_integrates_it_does_not_know():
+    assert arrows("ode") <= {"errors", "checks", "io"}
+
+
+def test_files_import_in_no_circle():
+    """Raises CycleError with the circle."""
+    list(TopologicalSorter(imports()).static_order())
