@@ -22,7 +22,7 @@ from rotorjax.simulation.history import read_history
 from rotorjax.simulation.run import SAVES, fly_from
 from rotorjax.simulation.start import start_of
 from rotorjax.simulation.wake_output import change
-from rotorjax.trim.run import Request
+from rotorjax.trim.run import request
 from rotorjax.wake.field import node_velocities
 
 jax.config.update("jax_enable_x64", True)
@@ -31,10 +31,10 @@ OMEGA = 27.0
 
 def steady(advance, height, revolutions, steps):
     """A case without histories."""
-    request = Request("uh60", 0.0058, "freewake", advance, height, tilt_deg=3.0 if advance and height is None else 0.0)
+    start = request("uh60", 0.0058, "freewake", advance, height, tilt_deg=3.0 if advance and height is None else 0.0)
     t, columns = read_history({}, COLUMNS, duration := revolutions * 2 * np.pi / OMEGA)
     columns[:, -1] = 100.0
-    return SimulationCase(request, duration, steps, t, columns)
+    return SimulationCase(start, duration, steps, t, columns)
 
 
 def in_turn(programs, *args, rounds=60):

@@ -20,7 +20,7 @@ from tqdm import tqdm
 from rotorjax.ground import plane
 from rotorjax.ode.anderson import anderson
 from rotorjax.rotor.catalogue import load
-from rotorjax.wake.equilibrium import Unknowns, displacement, evaluated, residual
+from rotorjax.wake.equilibrium import METHOD, Unknowns, displacement, evaluated, told
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import WASHOUT, Search, over_distant_ground, with_washout
@@ -45,7 +45,7 @@ def searched(model: FreeWake, factors: np.ndarray) -> tuple[Search, FreeWake, Un
     free = model if model.ground is None else free_wake(model.rotor, model.operating, None, model.settings)
     search = Search(TOL, None)
     washed = with_washout(free, WASHOUT)
-    first = anderson(residual, varied(free, *factors), washed, mixing=0.3, tol=1e-3, max_iterations=80, difference=True)
+    first = anderson(told, varied(free, *factors), washed, mixing=0.3, tol=1e-3, max_iterations=80, linear=METHOD)
     search.note("prescribed wake", first)
     here, x = search.follow(lambda s: with_washout(free, WASHOUT * (1 - s)), first.x, "washout", 0.4)
     if search.ok and model.ground is not None:

@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 import time
+from dataclasses import replace
 
 import jax
 from tqdm import tqdm
@@ -17,9 +18,7 @@ from tqdm import tqdm
 from rotorjax.reference.published import hayden
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import solidity
-from rotorjax.trim.dispatch import numbers_of, trim_request
-from rotorjax.trim.in_wake_run import run_in_wake
-from rotorjax.trim.run import Request
+from rotorjax.trim.run import Request, numbers, request, run
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.settings import flight_settings, quick_settings
 
@@ -42,20 +41,17 @@ class Trims:
         key = inflow, height, advance
         if key not in self.rows:
             area = DRAG_AREA if advance else None
-            self.rows[key] = self._made(Request(ROTOR, self.thrust, inflow, advance, height, drag_area=area))
+            self.rows[key] = self._made(request(ROTOR, self.thrust, inflow, advance, height, drag_area=area))
         return self.rows[key]
 
     def _made(self, request: Request) -> dict:
         clock, cpu = Clock(), time.process_time()
-        if request.inflow == "freewake":
-            found = run_in_wake(request, self._settings(request))
-        else:
-            near = self.last.get((request.inflow, request.height is None))
-            found = trim_request(request, near)
-            if found.trimmed.outcome.converged:
-                self.last[request.inflow, request.height is None] = found.z
+        kind = request.inflow, request.height is None
+        found = run(replace(request, wake=self._settings(request)), self.last.get(kind))
+        if found.converged:
+            self.last[kind] = found
         wall, compiling = clock.read()
-        return numbers_of(found) | {
+        return numbers(found) | {
             "compile_s": compiling,
             "solve_s": wall - compiling,
             "cpu_s": time.process_time() - cpu,

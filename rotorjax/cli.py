@@ -59,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _left(chosen, FAULT, _fault(error))
     finally:
         if programs is not None:
-            from rotorjax import program_cache
+            from rotorjax.io import program_cache
 
             program_cache.seal(programs, settled=0.0)
 
@@ -113,7 +113,7 @@ def _keep_programs() -> Path | None:
 
     import jax
 
-    from rotorjax import program_cache
+    from rotorjax.io import program_cache
 
     folder = program_cache.opened()
     if folder is not None:
@@ -127,7 +127,7 @@ def _keep_programs() -> Path | None:
 def _seal_earlier(event: str, folder: Path) -> None:
     """Seal the programs that were kept before this one, so that a killed run loses the last alone."""
     if event == "/jax/compilation_cache/cache_misses":
-        from rotorjax import program_cache
+        from rotorjax.io import program_cache
 
         program_cache.seal(folder)
 

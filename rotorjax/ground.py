@@ -82,4 +82,5 @@ def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
         raise refuse(
             "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
         )
-    return Plane(array(height), array(math.radians(slope_deg)) if known(slope_deg) else jnp.deg2rad(slope_deg))
+    slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
+    return Plane(array(height), array(slope))

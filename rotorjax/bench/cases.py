@@ -27,14 +27,14 @@ class Case:
         """Short name, also of its file: oge, h0.75, h1-slope15."""
         if self.height is None:
             return "oge"
-        return f"h{self.height:g}" + (f"-slope{self.slope_deg:g}" if self.slope_deg else "")
+        return f"h{_digits(self.height)}" + (f"-slope{_digits(self.slope_deg)}" if self.slope_deg else "")
 
     @property
     def label(self) -> str:
         """Name for readers."""
         if self.height is None:
             return "OGE"
-        return f"h = {self.height:g}" + (f", δ = {self.slope_deg:g}°" if self.slope_deg else "")
+        return f"h = {_digits(self.height)}" + (f", δ = {_digits(self.slope_deg)}°" if self.slope_deg else "")
 
     @property
     def ground(self) -> Plane | None:
@@ -72,6 +72,11 @@ def neighbour(case: Case, solved: Sequence[Case]) -> Case | None:
     near = [other for other in solved if other.height is not None and other != case]
     distant = next((other for other in solved if other.height is None), None)
     return min(near, key=lambda other: _distance(case, other), default=distant)
+
+
+def _digits(value: float) -> str:
+    """As few digits as tell a number from all others, so that no two cases share a name."""
+    return repr(float(value)).removesuffix(".0")
 
 
 def _distance(case: Case, other: Case) -> tuple[float, float]:

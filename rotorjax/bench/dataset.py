@@ -16,7 +16,7 @@ TERMS = (1, 2, 3, 4, 5)  # pressure terms compared out of ground effect (Fig. 8a
 
 
 def combine(cases: Sequence[xr.Dataset], settings: StudySettings) -> xr.Dataset:
-    """One data set with the dimension `case`; missing values are NaN.
+    """One data set with the dimension `case`, with `height` and `slope_deg` along it; missing values are NaN.
 
     Axisymmetric cases are repeated over the azimuths of the cases on a slope. Adds the rms differences, with all
     inflow over the free wake's mean out of ground effect (`reference_inflow`), and the inflow for one to five pressure
@@ -24,10 +24,13 @@ def combine(cases: Sequence[xr.Dataset], settings: StudySettings) -> xr.Dataset:
     """
     reference = reference_inflow(cases)
     count = max(data.sizes["azimuth"] for data in cases)
-    merged = xr.concat([_uniform(data, count, reference) for data in cases], "case", join="outer", data_vars="all")
+    alike = [_uniform(data, count, reference) for data in cases]
+    merged = xr.concat(alike, "case", join="outer", data_vars="all", coords="minimal", compat="override")
     labels = [case_of(data).name for data in cases]
-    merged = merged.assign_coords(case=("case", labels)).assign(
-        reference_inflow=((), reference, {"units": "1", "long_name": "free wake's mean inflow OGE over ΩR"})
+    merged = (
+        merged.assign_coords(case=("case", labels))
+        .set_coords(["height", "slope_deg"])
+        .assign(reference_inflow=((), reference, {"units": "1", "long_name": "free wake's mean inflow OGE over ΩR"}))
     )
     for data in cases:
         if case_of(data).height is None and "vpbfsm_inflow" in data:

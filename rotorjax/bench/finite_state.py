@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from rotorjax.bench.cases import Case
@@ -207,6 +206,8 @@ def _self_consistent(start, model, rotor, operating, stations):
 
     def residual(tau, _):
         return _pressure(disk_loading(rotor, blade(tau)), stations, model) - tau
+
+    import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
 
     rtol = _tolerance(start.dtype)
     found = optx.root_find(residual, optx.Newton(rtol=rtol, atol=rtol / 100), start, max_steps=50, throw=False)

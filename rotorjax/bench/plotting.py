@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from rotorjax.bench.azimuth import refine_azimuth
 from rotorjax.io.atomic import write_bytes
 
 FREE_WAKE, VPBFSM, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#009E73", "#222222"
@@ -113,7 +114,8 @@ def polar_contour(
     levels: np.ndarray,
     sides: tuple[str, str] = ("mountain side", "valley side"),
 ) -> Any:
-    """Filled contours of values (K, R) over the disk; ψ = 0 (aft, mountain) at the right, ψ = 270° at the top.
+    """Filled contours of values (K, R) over the disk; seen from above: ψ = 0 (aft, mountain) at the right,
+    ψ = 90° (starboard) at the top.
 
     axes: polar. psi: equally spaced over a turn (rad); few azimuths are refined by their Fourier series. sides: names
     of ψ = 0 and 180°. Returns the contour set, for a colour bar.
@@ -123,27 +125,16 @@ def polar_contour(
     filled = axes.contourf(closed_psi, r, closed.T, levels=levels, cmap="viridis", extend="both")
     axes.contour(closed_psi, r, closed.T, levels=levels[::2], colors="white", linewidths=0.4, alpha=0.6)
     axes.set_theta_zero_location("E")
-    axes.set_theta_direction(-1)
     axes.set(ylim=(0, 1), yticks=[0.5, 1.0])
     axes.set_yticklabels(["0.5", ""], color="white", fontsize=8)
     axes.set_thetagrids(range(0, 360, 90), ["", "ψ = 90°", "", "ψ = 270°"], fontsize=8)
     axes.grid(color="white", linewidth=0.4, alpha=0.5)
     axes.tick_params(pad=1)
+    axes.set_xlabel("seen from above", fontsize=8)
     for x, rotation, text in ((1.05, 270, f"{sides[0]}, ψ = 0°"), (-0.05, 90, f"{sides[1]}, ψ = 180°")):
         look = {"rotation": rotation, "ha": "center", "va": "center", "fontstyle": "italic", "fontsize": 8}
         axes.text(x, 0.5, text, transform=axes.transAxes, **look)
     return filled
-
-
-def refine_azimuth(psi: np.ndarray, values: np.ndarray, count: int = 72) -> tuple[np.ndarray, np.ndarray]:
-    """Values (K, R) at equally spaced azimuths from 0, at `count` of them instead, by their Fourier series."""
-    if psi.size >= count:
-        return psi, values
-    spectrum = np.fft.rfft(values, axis=0)
-    if psi.size % 2 == 0 and psi.size > 1:
-        spectrum[-1] *= 0.5  # the highest cosine is shared by two frequencies of the finer grid
-    fine = np.fft.irfft(spectrum, count, axis=0) * count / psi.size
-    return 2 * np.pi / count * np.arange(count), fine
 
 
 def shared_levels(fields: Sequence[np.ndarray], count: int = 15) -> np.ndarray:

@@ -10,7 +10,8 @@ from rotorjax.bench import finite_state
 from rotorjax.bench.finite_state import FiniteStateResult, Stations
 from rotorjax.bench.flapping import RIGID, flap_harmonics_deg
 from rotorjax.bench.settings import StudySettings
-from rotorjax.bench.wake_file import case_of, is_sound
+from rotorjax.bench.wake_file import case_of, is_sound, lost_at
+from rotorjax.potential.modes import ModeTable
 
 COMPARED = (0.25, 0.95)  # radii over R between which the distributions are compared
 
@@ -63,17 +64,19 @@ def stations_at(data: xr.Dataset, psi: np.ndarray) -> Stations:
 
 
 def add_finite_state(data: xr.Dataset, settings: StudySettings) -> xr.Dataset:
-    """Add the VPBFSM driven by the free wake's loads; unchanged where these cannot drive it."""
-    if not is_sound(data):
+    """Add the VPBFSM driven by the free wake's loads; unchanged where these cannot drive it or are another case's."""
+    if not is_sound(data) or lost_at(data) is not None:
         return data
     stations = stations_of(data, settings)
     result = finite_state.from_loads(case_of(data), settings, data["free_wake_dct_dr"].to_numpy(), stations)
-    return data.assign(variables_of(result, stations))
+    return data.assign(variables_of(result, stations, finite_state.model_of(case_of(data), settings).modes))
 
 
-def variables_of(result: FiniteStateResult, stations: Stations) -> dict[str, Any]:
-    """A VPBFSM result as labelled variables with their grids."""
+def variables_of(result: FiniteStateResult, stations: Stations, modes: ModeTable) -> dict[str, Any]:
+    """A VPBFSM result as labelled variables with their grids. modes: of its pressure coefficients."""
+    labels = [f"m = {mode.m}, n = {mode.n}, {mode.kind}" for mode in modes.modes]
     grid = {
+        "mode": ("mode", labels, {"long_name": "pressure terms: harmonic m, degree n, cosine or sine"}),
         "station_azimuth": ("station_azimuth", np.asarray(stations.psi), {"units": "rad"}),
         "grid_azimuth": ("grid_azimuth", finite_state.GRID_PSI, {"units": "rad"}),
         "grid_radius": ("grid_radius", finite_state.GRID_R, {"units": "1", "long_name": "radius over R"}),
@@ -128,11 +131,11 @@ def _flapping_entry(data: xr.Dataset) -> dict[str, Any]:
 
 def _free_wake_entry(data: xr.Dataset) -> dict[str, Any]:
     return {
-        "CT": float(data["CT"]),
-        "CP_induced": float(data["CP_induced"]),
+        **_loads_entry(data),
         "mean_inflow": float(data["free_wake_mean_inflow"]),
         "residual": float(data["free_wake_residual"]),
         "converged": bool(data["converged"]),
+        "lost_at": lost_at(data),
         "ground_normal_velocity_rms": float(data["free_wake_ground_normal_velocity_rms"]),
     }
 
@@ -143,5 +146,9 @@ def _finite_state_entry(data: xr.Dataset) -> dict[str, Any]:
         "ground_normal_velocity_rms": float(data["vpbfsm_ground_normal_velocity_rms"]),
     }
     if "free_wake_inflow" not in data:  # its own blade loads: what the free wake's entry holds otherwise
-        entry |= {"CT": float(data["CT"]), "CP_induced": float(data["CP_induced"])}
+        entry |= _loads_entry(data)
     return entry
+
+
+def _loads_entry(data: xr.Dataset) -> dict[str, float]:
+    return {name: float(data[name]) for name in ("CT", "CP", "CP_induced", "CP_profile")}

@@ -97,6 +97,6 @@ def _finite_state_alone(case: Case, settings: StudySettings) -> xr.Dataset:
     variables = {
         k: ((), v, {"units": "s" if k.endswith("_s") else "1", "long_name": t}) for k, (v, t) in numbers.items()
     }
-    data = xr.Dataset(wake_file.place_of(case) | variables, attrs={"case": case.name, "why": "VPBFSM alone"})
+    data = xr.Dataset(wake_file.place_of(case) | variables, attrs=wake_file.attributes(case, settings, "VPBFSM alone"))
     data = data.assign_coords(radius=("radius", np.asarray(stations.r), {"units": "1", "long_name": "radius over R"}))
-    return data.assign(variables_of(result, stations))
+    return data.assign(variables_of(result, stations, finite_state.model_of(case, settings).modes))

@@ -1,24 +1,14 @@
-"""One case on the screen and as a picture."""
+"""One case on the screen."""
 
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from rotorjax.bench.plotting import (
-    MODEL_STYLE,
-    across,
-    diameter_axes,
-    legend_below,
-    new_figure,
-    polar_contour,
-    save_file,
-    shared_levels,
-    style,
-)
+from rotorjax.bench.azimuth import valley_side
 from rotorjax.bench.record import inflow_rms_difference
 from rotorjax.bench.settings import StudySettings
-from rotorjax.bench.wake_file import case_of
+from rotorjax.bench.wake_file import case_of, lost_at
 from rotorjax.errors import InputError
 
 ENDINGS = (".png", ".pdf", ".svg")
@@ -38,7 +28,7 @@ def check_picture(path: Path | None) -> None:
 def table(data: xr.Dataset, settings: StudySettings, reference: float | None) -> str:
     """Numbers and inflow along the radius as aligned text; inflow over ΩR, induced, positive down."""
     case = case_of(data)
-    lines = [f"{settings.rotor.name}, collective {settings.collective_deg:g} deg, {case.label}", ""]
+    lines = [f"{settings.rotor.name}, collective {settings.collective_deg:g} deg, {title_of(data)}", ""]
     lines += [f"{name:<42}{value}" for name, value in _numbers(data, reference)]
     models = [
         model
@@ -51,41 +41,23 @@ def table(data: xr.Dataset, settings: StudySettings, reference: float | None) ->
         "Inflow over ΩR, positive down",
         _row(["r/R", *(f"{FIELDS[m][1]} {s}".strip() for m in models for s in sides)]),
     ]
-    columns = [_along(data[FIELDS[m][0]].to_numpy(), side) for m in models for side in sides.values()]
+    columns = [along(data[FIELDS[m][0]].to_numpy(), side) for m in models for side in sides.values()]
     for i, r in enumerate(data["radius"].to_numpy()):
         lines.append(_row([f"{r:.3f}", *(f"{column[i]:.5f}" for column in columns)]))
     return "\n".join(lines)
 
 
-def picture(data: xr.Dataset, reference: float | None, path: Path) -> None:
-    """Inflow across the disk and, on a slope, contours of the free wake's loading (or the VPBFSM's inflow)."""
-    case, scale = case_of(data), reference or 1.0
-    label = "inflow / mean OGE inflow of the free wake" if reference else "inflow over ΩR"
-    with style():
-        figure = new_figure(10.5 if case.slope_deg else 6.0, 4.0)
-        axes = figure.add_subplot(1, 2 if case.slope_deg else 1, 1)
-        for model, (name, _) in FIELDS.items():
-            if name not in data or (case.height is None and model == "exact_image"):
-                continue
-            field = data[name].to_numpy() / scale
-            axes.plot(*across(data["radius"].to_numpy(), _along(field, 0), _along(field, 1)), **MODEL_STYLE[model])
-        diameter_axes(axes, label, sides=case.slope_deg > 0)
-        axes.set_title(case.label, pad=18 if case.slope_deg else 6)
-        legend_below(axes, 3)
-        if case.slope_deg:
-            wake = "free_wake_inflow" in data
-            field = data["free_wake_inflow" if wake else "vpbfsm_inflow"].to_numpy() / scale
-            psi = data["azimuth" if wake else "station_azimuth"].to_numpy()
-            disk = figure.add_subplot(1, 2, 2, projection="polar")
-            filled = polar_contour(disk, data["radius"].to_numpy(), psi, field, shared_levels([field]))
-            disk.set_title("free wake" if wake else "VPBFSM", pad=18)
-            figure.colorbar(filled, ax=disk, label=label, shrink=0.8, pad=0.1)
-    save_file(figure, path)
+def title_of(data: xr.Dataset) -> str:
+    """Label of the case whose numbers a data set holds, which is another than asked for where the wake was lost."""
+    label, lost = case_of(data).label, lost_at(data)
+    if lost is not None:
+        return f"{lost} (NOT the case: the wake was lost there, on the way to {label})"
+    return label if bool(data.get("converged", 1)) else f"{label} (not converged)"
 
 
-def _along(field: np.ndarray, side: int | None) -> np.ndarray:
+def along(field: np.ndarray, side: int | None) -> np.ndarray:
     """Mean over ψ (None), or the mountain (0) or valley (1) side of (K, R)."""
-    return field.mean(axis=0) if side is None else field[side * (field.shape[0] // 2)]
+    return field.mean(axis=0) if side is None else valley_side(field) if side else field[0]
 
 
 def _row(cells: list[str]) -> str:

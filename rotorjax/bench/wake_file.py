@@ -50,8 +50,7 @@ _NO_VALUE = float("nan")
 
 def to_dataset(case: Case, solution: Solution, settings: StudySettings) -> xr.Dataset:
     """Pack a solution: arrays, numbers, the whole wake state, and the settings it was made with."""
-    data = xr.Dataset(attrs={"case": case.name, "why": solution.why, "fingerprint": settings.fingerprint()})
-    data.attrs["settings"] = json.dumps(settings.table(), ensure_ascii=False)
+    data = xr.Dataset(attrs=attributes(case, settings, solution.why))
     climb = {"inflow": settings.climb_ratio, "mean_inflow": settings.climb_ratio}  # kept is what is induced
     for name, (attribute, dims, about) in ARRAYS.items():
         values = np.asarray(getattr(solution, attribute), float) - climb.get(attribute, 0.0)
@@ -64,7 +63,15 @@ def to_dataset(case: Case, solution: Solution, settings: StudySettings) -> xr.Da
         values = np.asarray(getattr(solution.state, name))
         dims = tuple(f"{name}_{axis}" for axis in range(values.ndim))
         data[STATE + name] = (dims, values, {"units": "1", "long_name": f"free-wake state {name}, rotor units"})
-    return data.assign(place_of(case))
+    return data.assign(place_of(case) | _reached(solution))
+
+
+def attributes(case: Case, settings: StudySettings, why: str) -> dict[str, Any]:
+    """What a data set was made of and with. why: the solver stopped."""
+    table = settings.table()
+    named = {name: table[name] for name in ("rotorjax", "rotor", "collective_deg")}
+    made = {"fingerprint": settings.fingerprint(), "settings": json.dumps(table, ensure_ascii=False)}
+    return {"case": case.name, "why": why, **named, "climb_ratio": settings.climb_ratio, **made}
 
 
 def place_of(case: Case) -> dict[str, Any]:
@@ -74,6 +81,40 @@ def place_of(case: Case) -> dict[str, Any]:
         "height": ((), height, {"units": "1", "long_name": "height of the hub over the ground, over R; NaN: none"}),
         "slope_deg": ((), case.slope_deg, {"units": "degree", "long_name": "slope of the ground"}),
     }
+
+
+def _reached(solution: Solution) -> dict[str, Any]:
+    """What the wake belongs to: the case, or where the solver lost it on the way there."""
+    ground, about = solution.model.ground, "of the ground that the free wake reached"
+    height, slope = (_NO_VALUE, 0.0) if ground is None else (float(ground.height), float(np.rad2deg(ground.slope)))
+    return {
+        "reached_height": ((), height, {"units": "1", "long_name": f"height of the hub over that {about}, over R"}),
+        "reached_slope_deg": ((), slope, {"units": "degree", "long_name": f"slope {about}"}),
+        "reached_washout": (
+            (),
+            float(solution.model.washout),
+            {"units": "1", "long_name": "auxiliary flow that the free wake was left in, over ΩR"},
+        ),
+    }
+
+
+def lost_at(data: xr.Dataset) -> str | None:
+    """Where the free wake was lost on the way to its case, in words; None where it belongs to the case.
+
+    A wake that reached its case and stalls there before it is accurate enough has not converged but belongs to it.
+    """
+    if "reached_height" not in data:
+        return None
+    height, slope, washout = (float(data[f"reached_{name}"]) for name in ("height", "slope_deg", "washout"))
+    here = Case(None if np.isnan(height) else height, round(slope, 9))
+    where = [] if _same_place(here, case_of(data)) else [here.label]
+    return " ".join([*where, *([f"in an auxiliary flow of {washout:.3g} ΩR"] if washout else [])]) or None
+
+
+def _same_place(here: Case, there: Case) -> bool:
+    if here.height is None or there.height is None:
+        return here.height == there.height
+    return np.allclose([here.height, here.slope_deg], [there.height, there.slope_deg], rtol=1e-9, atol=1e-7)
 
 
 def case_of(data: xr.Dataset) -> Case:

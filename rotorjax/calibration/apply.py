@@ -10,6 +10,7 @@ import xarray as xr
 from jaxtyping import Array, Float
 
 from rotorjax.bench import finite_state
+from rotorjax.bench.azimuth import valley_side
 from rotorjax.bench.finite_state import Stations
 from rotorjax.bench.record import inflow_rms_difference, stations_at
 from rotorjax.bench.settings import StudySettings
@@ -66,7 +67,7 @@ def table(data: xr.Dataset, reference: float | None, calibration: Calibration) -
     field = data["calibrated_inflow"].to_numpy()
     columns = {"mean": field.mean(axis=0)}
     if float(data["slope_deg"]):
-        columns |= {"mountain": field[0], "valley": field[field.shape[0] // 2]}
+        columns |= {"mountain": field[0], "valley": valley_side(field)}
     lines += ["", f"{'r/R':>8}" + "".join(f"{'calibrated ' + name:>22}" for name in columns)]
     for i, r in enumerate(data["radius"].to_numpy()):
         lines.append(f"{r:8.3f}" + "".join(f"{column[i]:22.5f}" for column in columns.values()))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rotorjax.bench.cases import Case
+    from rotorjax.calibration.calibration_file import Calibration
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -60,3 +61,12 @@ def add_calibration(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="calibration.toml: the calibrated VPBFSM beside the printed one, or the free wake with its settings",
     )
+
+
+def calibration_of(chosen: argparse.Namespace) -> "Calibration | None":
+    """The calibration that --calibration names. Raises InputError where it is none."""
+    if chosen.calibration is None:
+        return None
+    from rotorjax.calibration.calibration_file import load
+
+    return load(chosen.calibration)

@@ -3,8 +3,12 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rotorjax.commands.arguments import add_calibration, add_harmonics, add_place, add_rotor, case_of
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_place, add_rotor, calibration_of, case_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -38,14 +42,11 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.bench.record import summary_entry
     from rotorjax.bench.settings import study_settings
     from rotorjax.bench.single import check_case, single_case
-    from rotorjax.bench.single_output import check_picture, picture, table
-    from rotorjax.calibration import apply
-    from rotorjax.calibration.calibration_file import load
-    from rotorjax.io import netcdf
-    from rotorjax.io.atomic import check_output, write_json
+    from rotorjax.bench.single_output import check_picture, table
+    from rotorjax.io.atomic import check_output
 
     case = case_of(chosen)
-    calibration = None if chosen.calibration is None else load(chosen.calibration)
+    calibration = calibration_of(chosen)
     changes = {} if calibration is None else calibration.wake_settings
     settings = study_settings(
         chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, flapping=False, **changes
@@ -62,14 +63,26 @@ def run(chosen: argparse.Namespace) -> int:
         data, reference = single_case(case, settings, chosen.model, progress)
     print(table(data, settings, reference))
     entry = summary_entry(data, reference)
-    if calibration is not None and not changes:
+    if calibration is not None and not changes and "vpbfsm_tau" in data:
+        from rotorjax.calibration import apply
+
         data = apply.add_calibrated(data, settings, calibration)
         print(apply.table(data, reference, calibration))
         entry |= {"calibrated": apply.entry(data, reference, calibration)}
+    _write(chosen, data, entry, reference)
+    return 0 if bool(data.get("converged", 1)) else 1
+
+
+def _write(chosen: argparse.Namespace, data: "xr.Dataset", entry: dict[str, Any], reference: float | None) -> None:
+    """The files that were asked for; what only one of them needs is imported for it alone."""
+    from rotorjax.io import netcdf
+    from rotorjax.io.atomic import write_json
+
     if chosen.json is not None:
         write_json(chosen.json, entry)
     if chosen.netcdf is not None:
-        netcdf.write(chosen.netcdf, data)
+        netcdf.write(chosen.netcdf, data.set_coords(["height", "slope_deg"]))
     if chosen.plot is not None:
+        from rotorjax.bench.single_picture import picture
+
         picture(data, reference, chosen.plot)
-    return 0 if bool(data.get("converged", 1)) else 1

@@ -4,7 +4,7 @@ import argparse
 import time
 from pathlib import Path
 
-from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor, calibration_of
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -31,7 +31,6 @@ def run(chosen: argparse.Namespace) -> int:
     """Run the study; the exit code."""
     from rotorjax.bench.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
     from rotorjax.bench.settings import study_settings
-    from rotorjax.calibration.calibration_file import load
     from rotorjax.study.output import write_all
     from rotorjax.study.run import solve_cases
 
@@ -39,7 +38,7 @@ def run(chosen: argparse.Namespace) -> int:
     heights = (QUICK_HEIGHTS if chosen.quick else HEIGHTS) if chosen.heights is None else chosen.heights
     slopes = (QUICK_SLOPES_DEG if chosen.quick else SLOPES_DEG) if chosen.slopes is None else chosen.slopes
     cases = study_cases(heights, slopes)
-    calibration = None if chosen.calibration is None else load(chosen.calibration)
+    calibration = calibration_of(chosen)
     changes = {} if calibration is None else calibration.wake_settings
     settings = study_settings(
         chosen.rotor,

@@ -34,15 +34,13 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
-    from rotorjax.bench.plotting import save_file
     from rotorjax.bench.single_output import check_picture
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
-    from rotorjax.trim.curve import curve, draw, requests
-    from rotorjax.trim.dispatch import numbers_of
-    from rotorjax.trim.run import Request, table
+    from rotorjax.trim.curve import curve, requests
+    from rotorjax.trim.run import numbers, request, table
 
-    base = Request(
+    base = request(
         rotor=chosen.rotor,
         thrust=chosen.thrust_coefficient,
         inflow=chosen.inflow,
@@ -61,10 +59,13 @@ def run(chosen: argparse.Namespace) -> int:
         check_output(path)
     free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
     results = curve([*wanted, *free])
-    found = [numbers_of(result) for result in results[: len(wanted)]]
+    found = [numbers(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))
     if chosen.json is not None:
         write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
     if chosen.plot is not None:
+        from rotorjax.bench.plotting import save_file  # matplotlib takes half a second to load
+        from rotorjax.trim.curve_picture import draw
+
         save_file(draw(results[: len(wanted)], results[-1] if free else None), chosen.plot)
     return 0 if all(one["converged"] for one in found) else 1

@@ -104,7 +104,7 @@ def _flapping(axes: Any, data: xr.Dataset) -> None:
 
 
 def snapshots(data: xr.Dataset) -> Figure:
-    """Draw the inflow over the disk at four instants, seen from above; forward is left, starboard down."""
+    """Draw the inflow over the disk at four instants, seen from above; forward is left, starboard up."""
     frames = np.linspace(0, data.sizes["frame"] - 1, _SNAPSHOTS).astype(int)
     with plotting.style():
         figure = plotting.new_figure(9.0, 3.0)
@@ -128,7 +128,7 @@ def _mesh(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _disk_axes(axes: Any, title: str) -> None:
-    axes.set(aspect="equal", xticks=[], yticks=[], title=title)
+    axes.set(aspect="equal", xticks=[], yticks=[], title=title, ylabel="seen from above")
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from rotorjax.errors import InputError
+from rotorjax.ode.newton import LinearSolve
 from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
 
 
@@ -45,15 +46,15 @@ def anderson(
     max_iterations: int = 200,
     safeguard: float = 10.0,
     measure: Measure = relative_rms,
-    difference: bool = False,
+    linear: LinearSolve | None = None,
     progress: bool = False,
 ) -> Outcome:
     """Find x = g(x, *args) from x0 by Anderson acceleration.
 
     x0: pytree of floating-point arrays. window: how many past differences are combined. mixing: share β of the
     remaining residual that is added, in (0, 1]. measure(f, x): size of the residual f = g(x) − x, relative rms by
-    default; `tol` is compared with it. difference: g returns f itself, as Newton's method wants it: one program then
-    serves both. safeguard: a residual that grows to this many times the best one (or is not
+    default; `tol` is compared with it. linear: g is a residual f for Newton's method with this linear solver, which
+    evaluates it: one program serves both. safeguard: a residual that grows to this many times the best one (or is not
     finite) goes back to the best iterate, forgets the window and halves the mixing until there is a new best.
 
     Numbers in `args` may change from call to call without compiling again, as long as `g` is the same function.
@@ -70,8 +71,10 @@ def anderson(
     args = traceable(args)
 
     def residual(x: np.ndarray) -> np.ndarray:
-        value = np.asarray(flat_residual(g, unravel, jnp.asarray(x, flat.dtype), args))
-        return value if difference else value - x
+        point = jnp.asarray(x, flat.dtype)
+        if linear is not None:
+            return np.asarray(linear.at(g, unravel, point, args)[0])
+        return np.asarray(flat_residual(g, unravel, point, args)) - x
 
     past, share = _Window(window), mixing
     x = np.asarray(flat)

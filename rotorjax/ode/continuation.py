@@ -51,7 +51,11 @@ def _secant(outcomes: list[Outcome], parameters: list[float], target: float, car
         return guess
     share = (target - parameters[-1]) / (parameters[-1] - parameters[-2])
     expected = carry(outcomes[-2].x, parameters[-2], parameters[-1])
-    return jax.tree.map(lambda g, new, old: g + share * (new - old), guess, outcomes[-1].x, expected)
+
+    def ahead(moved, new, old):
+        return np.asarray(moved) + share * (np.asarray(new) - np.asarray(old))
+
+    return jax.tree.map(ahead, guess, outcomes[-1].x, expected)
 
 
 def _unchanged(x: PyTree, here: float, there: float) -> PyTree:
@@ -126,7 +130,7 @@ def _lengths(asked: tuple[float | None, ...], usual: tuple[float, ...]) -> list[
 
 
 def _jumped(found: PyTree, guess: PyTree, last: PyTree, jump: float) -> bool:
-    found, guess, last = (np.asarray(ravel_pytree(x)[0]) for x in (found, guess, last))
+    found, guess, last = (np.concatenate([np.ravel(a) for a in jax.tree.leaves(x)]) for x in (found, guess, last))
     gone, allowed = np.linalg.norm(found - guess), 2 * np.linalg.norm(guess - last)
     return bool(gone > max(allowed, jump * np.linalg.norm(last)))
 

@@ -3,7 +3,8 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from functools import partial
+from typing import Any, Literal, NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -16,6 +17,8 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from rotorjax.errors import InputError
 from rotorjax.ode.jacobian import CHUNK, dense_jacobian
+from rotorjax.ode.outcome import flat_residual
+from rotorjax.ode.structure import require_like
 
 # Beyond this many corrections Broyden's inverse costs more to apply than it saves, and is stale.
 MOST_CORRECTIONS = 30
@@ -55,17 +58,20 @@ class Dense:
         if self.reuse not in ("none", "chord", "broyden"):
             raise InputError(f"Argument `reuse` must be 'none', 'chord' or 'broyden', but is {self.reuse!r}")
 
-    def direction(
-        self, f: Callable, unravel: Callable, x: Array, args: PyTree, value: Array, memory: Factor | None
-    ) -> tuple[np.ndarray, Factor]:
+    def at(self, f: Callable, unravel: Callable, x: Array, args: PyTree) -> tuple[Array, tuple]:
+        """Value, and what the Jacobian is made from if it comes to that."""
+        return flat_residual(f, unravel, x, args), (f, unravel, x, args)
+
+    def direction(self, place: tuple, value: np.ndarray, memory: Factor | None) -> tuple[np.ndarray, Factor]:
         """Solve J d = −value with a Jacobian from memory or made here."""
         if memory is None:
+            f, unravel, x, args = place
             jacobian = dense_jacobian(_Flat(f, unravel), x, *args, chunk=self.chunk, progress=self.progress)
             with warnings.catch_warnings():
                 # An exactly singular Jacobian gives a direction of infinities, which the line search turns down.
                 warnings.simplefilter("ignore", scipy.linalg.LinAlgWarning)
                 memory = Factor(scipy.linalg.lu_factor(jacobian, overwrite_a=True, check_finite=False))
-        return memory.solve(-np.asarray(value)), memory
+        return memory.solve(-value), memory
 
     def retry(self, memory: Factor, fresh: bool) -> tuple[bool, None]:
         """A reused Jacobian is made anew; a new one is as good as it gets."""
@@ -103,36 +109,49 @@ class Forcing:
         return min(largest, max(rtol, TIGHTEST))
 
 
+class Place(NamedTuple):
+    """A point of a residual: x, the Jacobian's product there, the preconditioner, and what else the residual told."""
+
+    x: Array
+    product: Callable[[Array], Array]
+    inverse: Callable[[Array], Array] | None
+    told: PyTree
+
+
 @dataclass(frozen=True)
 class Krylov:
     """Direction from GMRES on Jacobian-vector products, no matrix.
 
+    Value and linear map come from one program (`jax.linearize`), which is run wherever the residual is evaluated.
     restart: Krylov vectors before a restart; a short one stagnates on wake-like spectra, so it is long. restarts: how
     often. precondition(v, x, *args): pytree map close to J⁻¹ v, or None. forcing: largest relative tolerance of the
-    linear solve, tightened as Newton converges (Eisenstat & Walker 1996, doi:10.1137/0917003, choice 2).
+    linear solve, tightened as Newton converges (Eisenstat & Walker 1996, doi:10.1137/0917003, choice 2). tells: the
+    residual returns a pair, itself and something else that it knows, which is kept in the `Place`.
     """
 
     restart: int = 400
     restarts: int = 3
     precondition: Callable[..., PyTree] | None = None
     forcing: float = 0.1
+    tells: bool = False
 
-    def direction(
-        self, f: Callable, unravel: Callable, x: Array, args: PyTree, value: Array, memory: Forcing | None
-    ) -> tuple[np.ndarray, Forcing]:
-        """Solve J d = −value to the forcing tolerance."""
-        size = float(jnp.linalg.norm(value))
-        rtol = self.forcing if memory is None else memory.next(size, self.forcing)
-        matrix = _operator(lambda v: _product(f, unravel, x, args, v), x)
+    def at(self, f: Callable, unravel: Callable, x: Array, args: PyTree) -> tuple[Array, Place]:
+        """Value, and the linear map there."""
+        value, product, told = _linearised(f, unravel, x, args, self.tells)
         inverse = None
         if self.precondition is not None:
-            precondition = self.precondition
-            inverse = _operator(lambda v: _preconditioned(precondition, unravel, x, args, v), x)
+            inverse = partial(_preconditioned, self.precondition, unravel, x, args)
+        return value, Place(x, partial(_product, product), inverse, told)
+
+    def direction(self, place: Place, value: np.ndarray, memory: Forcing | None) -> tuple[np.ndarray, Forcing]:
+        """Solve J d = −value to the forcing tolerance."""
+        size, x = float(np.linalg.norm(value)), place.x
+        rtol = self.forcing if memory is None else memory.next(size, self.forcing)
+        matrix = _operator(place.product, x)
+        inverse = None if place.inverse is None else _operator(place.inverse, x)
         # scipy's, on host: it leaves as soon as rtol is met. jax 0.10.1's "incremental" method adds a wrong last term
         # when it does so, and its "batched" one and lineax's finish every cycle of `restart` products.
-        d, _ = gmres(
-            matrix, -np.asarray(value), rtol=rtol, restart=min(self.restart, x.size), maxiter=self.restarts, M=inverse
-        )
+        d, _ = gmres(matrix, -value, rtol=rtol, restart=min(self.restart, x.size), maxiter=self.restarts, M=inverse)
         return d, Forcing(size, rtol)
 
     def learn(self, memory: Forcing, step: np.ndarray, change: np.ndarray, ratio: float) -> Forcing:
@@ -155,9 +174,21 @@ class _Flat(eqx.Module):
 
 
 @eqx.filter_jit
-def _product(f: Callable, unravel: Callable, x: Array, args: PyTree, v: Array) -> Array:
-    """Jacobian at x times v."""
-    return jax.jvp(lambda y: ravel_pytree(f(unravel(y), *args))[0], (x,), (v,))[1]
+def _linearised(f: Callable, unravel: Callable, x: Array, args: PyTree, tells: bool) -> tuple:
+    """f(x, *args) between flat vectors, checked as in `flat_residual`, its linear map at x, and what else f tells."""
+
+    def flat(y: Array) -> tuple[Array, PyTree]:
+        value, told = f(unravel(y), *args) if tells else (f(unravel(y), *args), None)
+        require_like(value, unravel(y), "residual(x, ...)")
+        return ravel_pytree(value)[0], told
+
+    return jax.linearize(flat, x, has_aux=True)
+
+
+@jax.jit
+def _product(linear_map: Callable[[Array], Array], v: Array) -> Array:
+    """The linear map applied: it holds its numbers as arrays, so that one program serves all places."""
+    return linear_map(v)
 
 
 @eqx.filter_jit
@@ -168,7 +199,7 @@ def _preconditioned(f: Callable, unravel: Callable, x: Array, args: PyTree, v: A
 def _operator(apply: Callable[[Array], Array], like: Array) -> LinearOperator:
     def matvec(v: np.ndarray) -> np.ndarray:
         # A copy: GMRES writes into what it gets, and jax's arrays are read-only.
-        return np.array(apply(jnp.asarray(v, like.dtype).ravel()))
+        return np.array(apply(jnp.asarray(np.ravel(v), like.dtype)))
 
     # cast: the checker takes the class, whose __new__ builds a subclass, for the subclass.
     return cast(Any, LinearOperator)((like.size, like.size), matvec=matvec, dtype=like.dtype)

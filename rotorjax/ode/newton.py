@@ -8,13 +8,17 @@ import numpy as np
 from jaxtyping import PyTree
 
 from rotorjax.ode.linear import Dense
-from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
+from rotorjax.ode.outcome import Log, Measure, Outcome, advice, attainable, flatten, relative_rms, traceable
 
 
 class LinearSolve(Protocol):
     """Where Newton gets its direction from; `memory` is whatever the method reuses from step to step."""
 
-    def direction(self, f: Callable, unravel: Callable, x: Any, args: PyTree, value: Any, memory: Any) -> tuple:
+    def at(self, f: Callable, unravel: Callable, x: Any, args: PyTree) -> tuple[Any, Any]:
+        """Return f's flat value at flat x, and all that `direction` needs of that place."""
+        ...
+
+    def direction(self, place: Any, value: np.ndarray, memory: Any) -> tuple[np.ndarray, Any]:
         """Return (direction, memory) with J direction ≈ −value."""
         ...
 
@@ -50,6 +54,8 @@ def newton(
     `Krylov(...)`. measure(f, x): size of the residual, relative rms by default; `tol` is compared with it. memory: that
     of an earlier Outcome, so that a continuation can go on with a factorised Jacobian.
 
+    In single precision `tol` is at least 1e-5.
+
     A step is halved until the residual falls (Armijo, 1e-4); where a reused Jacobian finds no descent it is made anew
     before giving up. Numbers in `args` may change without compiling again, as long as `residual` is the same function.
     A run that diverges, stalls or is interrupted returns the best iterate with `converged` False and says why.
@@ -60,26 +66,27 @@ def newton(
     flat, unravel = flatten(x0)
     args = traceable(args)
 
-    def evaluate(x: np.ndarray) -> np.ndarray:
-        return np.asarray(flat_residual(residual, unravel, jnp.asarray(x, flat.dtype), args))
+    def evaluate(x: np.ndarray) -> tuple[np.ndarray, Any]:
+        value, place = linear.at(residual, unravel, jnp.asarray(x, flat.dtype), args)
+        return np.asarray(value), place
 
     x = np.asarray(flat)
-    with Log("newton", tol, max_iterations, progress) as log:
-        f = evaluate(x)
+    with Log("newton", attainable(tol, flat.dtype), max_iterations, progress) as log:
+        f, place = evaluate(x)
         size = measure(f, x)
         done = log.note(x, size)
         if not np.isfinite(size):
             log.why = "the residual is not finite at the start"
         while not done and np.isfinite(size) and len(log.residuals) <= max_iterations:
             fresh = memory is None
-            direction, memory = linear.direction(residual, unravel, jnp.asarray(x), args, jnp.asarray(f), memory)
-            share, new, new_f, new_size = _backtrack(evaluate, measure, x, direction, size)
+            direction, memory = linear.direction(place, f, memory)
+            share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size)
             if new_size >= size:
                 again, memory = linear.retry(memory, fresh)
                 if not again:
                     log.why = (
                         f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
-                        "lowers the residual (a fold, a kink or the limit of precision)"
+                        f"lowers the residual (a fold, a kink or the limit of precision{advice(flat.dtype)})"
                     )
                     break
                 continue
@@ -88,19 +95,21 @@ def newton(
                 memory = linear.learn(memory, new - x, new_f - f, new_size / size)
             else:
                 _, memory = linear.retry(memory, fresh)
-            x, f, size = new, new_f, new_size
+            x, f, place, size = new, new_f, new_place, new_size
     return log.outcome(unravel, memory)
 
 
 def _backtrack(
-    evaluate: Callable[[np.ndarray], np.ndarray], measure: Measure, x: np.ndarray, direction: np.ndarray, size: float
-) -> tuple[float, np.ndarray, np.ndarray, float]:
-    """Halve the step until the residual falls; returns share, iterate, residual and size of the last one tried."""
+    evaluate: Callable[[np.ndarray], tuple], measure: Measure, x: np.ndarray, direction: np.ndarray, size: float
+) -> tuple[float, np.ndarray, tuple[np.ndarray, Any], float]:
+    """Halve the step until the residual falls; returns share, iterate, what `evaluate` finds and the residual's size
+    of the last one tried.
+    """
     share = 1.0
     while True:
         new = x + share * direction
-        f = evaluate(new)
-        found = measure(f, new)
-        if found <= (1 - 1e-4 * share) * size or share <= SMALLEST_STEP:
-            return share, new, f, found
+        found = evaluate(new)
+        new_size = measure(found[0], new)
+        if new_size <= (1 - 1e-4 * share) * size or share <= SMALLEST_STEP:
+            return share, new, found, new_size
         share /= 2

@@ -48,10 +48,25 @@ def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(f)))) / (scale if scale > 0 else 1.0)
 
 
+SINGLE = 1e-5  # residual that single precision reaches in these models: its rounding of 6e-8, grown by their sums
+
+
+def attainable(tol: float, dtype: Any) -> float:
+    """A tolerance, or what single precision can meet of it."""
+    return tol if jnp.finfo(dtype).bits == 64 else max(tol, SINGLE)
+
+
+def advice(dtype: Any) -> str:
+    """What to do about a residual that stays too large, where single precision may be to blame."""
+    single = jnp.finfo(dtype).bits < 64
+    return ' in single precision; jax.config.update("jax_enable_x64", True) lifts it' if single else ""
+
+
 def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
     """Flat vector of a state and the way back, after checking that it is made of finite floating-point numbers.
 
-    Raises InputError where a leaf is not.
+    On the host, where nothing needs compiling; there the way back is `unravelled`. Raises InputError where a leaf is
+    not.
     """
     leaves, _ = jax.tree_util.tree_flatten_with_path(x)
     for path, leaf in leaves:
@@ -60,10 +75,26 @@ def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[
                 f"Argument `{name}` must hold floating-point arrays only, but {jax.tree_util.keystr(path) or 'it'} "
                 f"is {jnp.result_type(leaf)}: cast it or pass it elsewhere"
             )
-    flat, unravel = ravel_pytree(x)
-    if not bool(jnp.all(jnp.isfinite(flat))):
+    flat, unravel = ravelled(x)
+    if not np.all(np.isfinite(flat)):
         raise InputError(f"Argument `{name}` must be finite, but holds NaN or infinity")
     return flat, unravel
+
+
+def ravelled(x: PyTree) -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
+    """`jax.flatten_util.ravel_pytree` of numbers, on the host."""
+    flat = np.concatenate([np.zeros(0), *(np.ravel(leaf) for leaf in jax.tree.leaves(x))])
+    ways = []
+    jax.eval_shape(lambda x: ways.append(ravel_pytree(x)[1]), x)  # hashable, and equal for all x of one structure
+    return jnp.asarray(flat, jnp.result_type(float, *jax.tree.leaves(x))), ways[0]
+
+
+def unravelled(unravel: Callable[[Array], PyTree], flat: Float[np.ndarray, " n"]) -> PyTree:
+    """unravel(flat), on the host."""
+    leaves, structure = jax.tree.flatten(jax.eval_shape(unravel, flat))
+    parts = np.split(flat, np.cumsum([leaf.size for leaf in leaves])[:-1])
+    made = [jnp.asarray(p.reshape(leaf.shape), leaf.dtype) for p, leaf in zip(parts, leaves, strict=True)]
+    return jax.tree.unflatten(structure, made)
 
 
 def traceable(args: PyTree) -> PyTree:
@@ -122,5 +153,5 @@ class Log:
         converged = self.best <= self.tol
         why = self.why or f"residual {self.best:.2e} is above {self.tol:.1e} after {made} of {self.limit} iterations"
         spent = time.perf_counter() - self._start
-        x = unravel(jnp.asarray(self.best_x))
+        x = unravelled(unravel, np.asarray(self.best_x))
         return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, memory, self.interrupted)

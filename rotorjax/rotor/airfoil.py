@@ -62,14 +62,12 @@ def lift_drag(
     """(cl, cd) at angles of attack α (rad, any number of turns) and Mach numbers, elementwise."""
     alpha, mach = jnp.broadcast_arrays(alpha, mach)
     wrapped = alpha - 2 * jnp.pi * jnp.floor((alpha + jnp.pi) / (2 * jnp.pi))
-    i, width_a, basis_a = _hermite(wrapped, table.alpha)
-    j, width_m, basis_m = _hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
+    i, basis_a = _hermite(wrapped, table.alpha)
+    j, basis_m = _hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
     # One gather for the four corners: [*n, corner α, corner M, (cl, cd), order α, order M].
     corner = jnp.arange(2)
     patch = table.nodes[(i[..., None] + corner)[..., :, None], (j[..., None] + corner)[..., None, :]]
-    weight_a = basis_a * jnp.stack([jnp.ones_like(width_a), width_a], -1)[..., None, :]
-    weight_m = basis_m * jnp.stack([jnp.ones_like(width_m), width_m], -1)[..., None, :]
-    weights = weight_a[..., :, None, None, :, None] * weight_m[..., None, :, None, None, :]
+    weights = basis_a[..., :, None, None, :, None] * basis_m[..., None, :, None, None, :]
     cl, cd = jnp.moveaxis(jnp.sum(patch * weights, axis=(-5, -4, -2, -1)), -1, 0)
     if table.prandtl_glauert:
         cl = cl * (1 + (prandtl_glauert_factor(mach) - 1) * _attached(wrapped))
@@ -128,14 +126,13 @@ def linear_airfoil(slope: float = 2 * np.pi, cd: float = 0.0, zero_lift: float =
 
 
 def _hermite(x, nodes):
-    """Interval index, its width, and the cubic Hermite basis [*n, corner, order] at x."""
+    """Interval index and the cubic Hermite basis [*n, corner, order] at x, that of slopes times the width."""
     i = jnp.clip(jnp.searchsorted(nodes, x, side="right", method="compare_all") - 1, 0, nodes.size - 2)
-    width = nodes[i + 1] - nodes[i]
-    t = (x - nodes[i]) / width
+    start, width = jnp.moveaxis(jnp.stack([nodes[:-1], jnp.diff(nodes)], axis=-1)[i], -1, 0)
+    t = (x - start) / width
     value = t * t * (3 - 2 * t)
-    left = jnp.stack([1 - value, t * (1 - t) ** 2], -1)
-    right = jnp.stack([value, t * t * (t - 1)], -1)
-    return i, width, jnp.stack([left, right], -2)
+    basis = jnp.stack([1 - value, width * t * (1 - t) ** 2, value, width * t * t * (t - 1)], -1)
+    return i, basis.reshape(*basis.shape[:-1], 2, 2)
 
 
 def _attached(alpha):

@@ -15,6 +15,7 @@ because on the UH-60 it concerns the last 7 % of the span, where a tip is anythi
 paper nor the tables' source applies it.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -78,7 +79,7 @@ def section_loads(
     while lift stays across the flow (u_T, u_P). Broadcasts; a section in still air (u_T = u_P = 0) carries no load and
     has finite derivatives.
     """
-    u_t, u_p, r = jnp.broadcast_arrays(u_tangential, u_perpendicular, r)
+    u_t, u_p = jnp.broadcast_arrays(u_tangential, u_perpendicular)
     pitch = (operating.collective if collective is None else collective) + geometry.twist(rotor, r)
     still = (u_t == 0) & (u_p == 0)
     # atan2 and the square root have no derivative at the origin: move the input, not the output.
@@ -88,9 +89,14 @@ def section_loads(
     alpha = pitch - jnp.arctan2(u_p + chord_downwash, safe_t)
     mach = speed * operating.tip_mach(rotor.radius)
     entry = alpha if span_mean is None else alpha @ span_mean.T
-    cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
-    if span_mean is not None:
-        cl = cl + attached_slope(rotor, r, mach, simple_sweep) * (alpha - entry)
+    if span_mean is None:
+        cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
+    else:
+        # one look-up for the sections' own angles and, at zero angle, for the slope where the flow is attached
+        angles = jnp.stack([jnp.zeros_like(entry), entry])
+        look_up = partial(_coefficients, rotor, r, mach=mach, simple_sweep=simple_sweep)
+        (cl, cd), (slope, _) = jax.jvp(look_up, (angles,), (jnp.ones_like(angles),))
+        cl, cd = cl[1] + slope[0] * (alpha - entry), cd[1]
     half_chord = 0.5 * geometry.chord(rotor, r)
     dynamic = half_chord * (u_t**2 + u_p**2)
     return SectionLoads(
@@ -116,7 +122,7 @@ def span_averages(r: Float[Array, " R"], widths: Float[Array, " R"], length: Flo
     """
     gap = r[None, :] - r[:, None]
     weight = widths * jnp.exp(-0.5 * (gap / length[:, None]) ** 2)
-    total, first, second = (jnp.sum(weight * gap**n, axis=1, keepdims=True) for n in range(3))
+    total, first, second = jnp.sum(jnp.stack([weight, weight * gap, weight * gap**2]), axis=-1, keepdims=True)
     return weight * (second - first * gap) / (second * total - first**2)
 
 
@@ -151,16 +157,6 @@ def rotor_coefficients(
     profile = total(r * drag * jnp.cos(phi))
     thrust = total(lift * jnp.cos(phi) - drag * jnp.sin(phi))
     return RotorCoefficients(thrust, induced + profile, induced, profile)
-
-
-def attached_slope(rotor: Rotor, r, mach, simple_sweep: bool = False) -> Float[Array, "*n"]:
-    """Lift slope (per rad) at zero angle of attack, where the flow is attached."""
-
-    def lift(alpha):
-        return _coefficients(rotor, r, alpha, mach, simple_sweep)[0]
-
-    still = jnp.zeros_like(mach)
-    return jax.jvp(lift, (still,), (jnp.ones_like(mach),))[1]
 
 
 def _coefficients(rotor, r, alpha, mach, simple_sweep):

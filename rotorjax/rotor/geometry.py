@@ -31,8 +31,14 @@ class Table(eqx.Module):
     values: Float[Array, " S"]
 
     def __call__(self, r: Float[Array, "*n"]) -> Float[Array, "*n"]:
-        """Read the table at r (over R) by straight lines, constant beyond its ends."""
-        return jnp.interp(r, self.stations, self.values)
+        """Read the table at r (over R) by straight lines, constant beyond its ends.
+
+        Every interval gives its slope times the way that r has come along it: `jnp.interp` looks for the interval in a
+        loop, which takes ten times as long to compile. On a station the derivative is the mean of both sides.
+        """
+        widths = jnp.diff(self.stations)
+        come = jnp.clip(jnp.asarray(r)[..., None] - self.stations[:-1], 0, widths)
+        return self.values[0] + jnp.sum(come * (jnp.diff(self.values) / widths), axis=-1)
 
 
 class Hinge(eqx.Module):

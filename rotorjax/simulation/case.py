@@ -42,9 +42,7 @@ from rotorjax.checks import Range
 from rotorjax.errors import InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
 from rotorjax.simulation.history import read_history, smooth
-from rotorjax.trim.dispatch import ALL
-from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
-from rotorjax.trim.run import Request
+from rotorjax.trim.run import FREE_WAKE, INFLOWS, Request, request
 from rotorjax.wake.settings import wake_settings
 
 COLUMNS = (
@@ -54,7 +52,7 @@ COLUMNS = (
 """In the order of Eq. 11."""
 _FLIGHT = {
     "rotor": Key("text"),
-    "inflow": Key("text", choices=ALL),
+    "inflow": Key("text", choices=INFLOWS),
     "thrust_coefficient": Key("number", Range(0.0, 0.1, above=True), required=True),
     "advance_ratio": Key("number", Range(0.0, 0.5)),
     "height": Key("number", Range(0.0, 100.0, "R", above=True)),
@@ -157,13 +155,16 @@ def _request(flight: dict[str, Any], folder: Path) -> Request:
     values = {names.get(k, k): v for k, v in flight.items()}
     rotor = values.get("rotor", "uh60")
     values["rotor"] = str(folder / rotor) if rotor.endswith(".toml") else rotor
-    return Request(**values)
+    return request(**values)
 
 
 def steps_of(case: SimulationCase, omega: float, per_turn: int) -> int:
-    """Number of steps of a march, a multiple of twelve; per_turn: of a revolution. Raises InputError for too many."""
-    turns = case.duration * omega / (2 * np.pi)
-    steps = 12 * max(1, round(turns * per_turn / 12))
+    """Number of steps of a march, its last and shorter twelfth of a turn included; per_turn: of a revolution.
+
+    Raises InputError for too many.
+    """
+    twelfths = case.duration * omega / (2 * np.pi) * 12
+    steps = per_turn // 12 * max(1, int(np.ceil(twelfths * (1 - 1e-12))))
     if steps > _MOST_STEPS:
         raise InputError(f"[time] duration must make at most {_MOST_STEPS} steps, but {case.duration:g} s make {steps}")
     return steps

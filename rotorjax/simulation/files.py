@@ -27,7 +27,7 @@ def write_all(found: Simulated, out: Path, *, animated: bool = False) -> dict[st
         write_vtk(out / "vtk", data)
         plotting.save(wake_picture(data), out / "wake")
     if animated and wake:
-        wake_film(data, output.over_a_turn(data["CT"].values), out / "animation.gif")
+        wake_film(data, output.over_a_turn(data, "CT"), out / "animation.gif")
     elif animated:
         output.animation(data, out / "animation.gif")
     return told

@@ -17,7 +17,7 @@ from rotorjax.coupled_wake import CoupledWake
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import ATTITUDE
 from rotorjax.simulation.ground_view import ground_arrays, ground_line
-from rotorjax.simulation.run import SAVES, Simulated
+from rotorjax.simulation.run import Simulated
 from rotorjax.simulation.wake_output import wake_arrays
 
 _RAYS, _RADII, _MOST_FRAMES = 36, 16, 90
@@ -46,6 +46,8 @@ def dataset(found: Simulated) -> xr.Dataset:
             "finished": int(found.finished),
         },
     )
+    for name in ("CT", "CQ"):
+        data[f"trim_{name}"] = ((), getattr(found.start, name), {"long_name": "mean over a revolution of the trim"})
     data["azimuth"] = ("time", np.asarray(x.psi), {"units": "rad"})
     for name in ("theta_0", "theta_1c", "theta_1s"):
         data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
@@ -145,9 +147,10 @@ def histories(data: xr.Dataset) -> Figure:
             flapping.plot(t, data["flap"].sel(coordinate=name), ls=line, label=rf"$\beta_{{{name}}}$")
         flapping.set(ylabel="flap, deg")
         for name, label, line in (("CT", r"$C_T$", "-"), ("CQ", r"$C_Q$", "--")):
-            turned = over_a_turn(data[name].values)
-            loads.plot(t, turned / turned[0], ls=line, label=f"{label} / {turned[0]:.3e}")
-        loads.set(xlabel="time, s", ylabel="mean over a revolution, over the first")
+            turned = over_a_turn(data, name)
+            (mean,) = loads.plot(t, turned / turned[0], ls=line, label=f"{label}, trim {turned[0]:.3e}")
+            loads.plot(t, data[name] / turned[0], ls=line, lw=0.7, alpha=0.5, color=mean.get_color())
+        loads.set(xlabel="time, s", ylabel="over the trim's (bold: last turn's mean)")
         for name in ("u", "v", "w"):
             if float(abs(data[name]).max()) > 1e-9:
                 motion.plot(t, data[name], label=f"${name}$, m/s")
@@ -157,21 +160,29 @@ def histories(data: xr.Dataset) -> Figure:
         for name in ("roll", "pitch"):
             if float(abs(data[name] - data[name][0]).max()) > 1e-9:
                 motion.plot(t, data[name], ls=(0, (1, 3)), label=f"{name}, deg")
-        motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
+        if float(abs(data["rotor_speed"] - 1).max()) > 1e-9:
+            motion.plot(t, 100 * (data["rotor_speed"] - 1), ls=":", label=r"$\Omega$ change, %")
         if "height" in data:
             motion.plot(t, data["height"], ls="-.", color=plotting.INK, label="height over $R$")
         motion.set(xlabel="time, s", ylabel="hub")
-        for axes in (controls, flapping, loads, motion):
+        if not motion.lines:
+            motion.text(0.5, 0.5, "hub at rest", ha="center", transform=motion.transAxes)
+        for axes in (controls, flapping, loads, *([motion] if motion.lines else [])):
             axes.legend(loc="best", fontsize=8)
     return figure
 
 
-def over_a_turn(values: np.ndarray) -> np.ndarray:
-    """Running mean over one revolution, the ends repeated."""
-    kernel = np.ones(SAVES) / SAVES
-    padded = np.concatenate([np.repeat(values[:SAVES].mean(), SAVES // 2), values, np.repeat(values[-1], SAVES - 1)])
-    padded[-(SAVES - 1) :] = values[-SAVES:].mean()
-    return np.convolve(padded, kernel, "valid")[: values.size]
+def over_a_turn(data: xr.Dataset, name: str) -> np.ndarray:
+    """Mean of a history over the revolution that ends at each instant; before the start it is the trim's mean.
+
+    ∫f dψ/2π from ψ − 2π to ψ by trapezoids: no instant knows of what comes after it.
+    """
+    psi, values, before = data["azimuth"].values, data[name].values, float(data[f"trim_{name}"])
+    before = before if np.isfinite(before) else float(values[0])
+    so_far = np.concatenate([[0.0], np.cumsum(np.diff(psi) * (values[1:] + values[:-1]) / 2)])
+    since = psi - psi[0] - 2 * np.pi
+    earlier = np.where(since < 0, since * before, np.interp(psi - 2 * np.pi, psi, so_far))
+    return (so_far - earlier) / (2 * np.pi)
 
 
 def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -> None:
@@ -181,7 +192,7 @@ def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -
     fields = np.concatenate([fields, fields[:, :1]], axis=1)
     r = data["radius"].values
     x, y = r * np.cos(psi)[:, None], r * np.sin(psi)[:, None]
-    large, thrust, t = 3.0, over_a_turn(data["CT"].values), data["time"].values
+    large, thrust, t = 3.0, over_a_turn(data, "CT"), data["time"].values
 
     def build(figure: Figure) -> Any:
         side, disk, history = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.2))
@@ -193,7 +204,7 @@ def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 15) -
         spokes = [disk.plot([], [], color="white", lw=1.2)[0] for _ in data["blade"]]
         history.plot(t, thrust, color=plotting.FREE_WAKE)
         (dot,) = history.plot([], [], "o", color=plotting.INK, ms=5)
-        history.set(xlabel="time, s", ylabel=r"$C_T$, mean over a revolution")
+        history.set(xlabel="time, s", ylabel=r"$C_T$, mean over the last revolution")
         lowest = -float(data["height"].max()) if "height" in data else -0.6
         side.set(xlim=(-1.15, 1.15), ylim=(min(lowest, -0.6) - 0.1, 0.8), aspect="equal", xticks=[], yticks=[])
         side.set_xlabel("forward ← → aft")

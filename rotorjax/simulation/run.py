@@ -16,7 +16,6 @@ from rotorjax.coupled import Coupled, CoupledState, Outputs, output, rhs
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import ATTITUDE, RotorInputs
 from rotorjax.simulation.case import SimulationCase, steps_of
@@ -114,7 +113,7 @@ def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
     report = progress or (lambda stage: None)
     request = case.request
     if request.height is not None and request.drag_area is None:  # said before the trim's work
-        path_of(case, *catalogue.load(request.rotor), float(np.deg2rad(request.tilt_deg)))
+        path_of(case, request.rotor, request.operating, float(np.deg2rad(request.tilt_deg)))
     report("trim")
     return fly_from(case, start_of(case, report), report)
 
@@ -126,23 +125,35 @@ def fly_from(case: SimulationCase, start: Start, progress: Progress | None = Non
     omega = float(p.operating.omega)
     per_turn = steps_per_turn(case, start)
     steps = steps_of(case, omega, per_turn)
-    every = per_turn // SAVES
-    steps -= steps % every
-    dt = 2 * np.pi / per_turn
-
-    def go(count: int, show: bool) -> Trajectory:
-        return march(driven, start.x, 0.0, dt, count, driver, p, save_every=every, progress=show)
-
     report("compile the march")
-    go(every, False)
+    _marched(driver, start, per_turn // SAVES, per_turn, 2 * np.pi / SAVES)
     report("march")
     begun = time.perf_counter()
-    found = go(steps, progress is not None and isinstance(p, CoupledWake))
+    watched = progress is not None and isinstance(p, CoupledWake)
+    found = _marched(driver, start, steps, per_turn, case.duration * omega, watched)
     jax.block_until_ready(found.x)
     spent = time.perf_counter() - begun
     report("outputs")
     u, y = _outputs(found.t, found.x, driver, p)
     return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why)
+
+
+def _marched(driver: Driver, start: Start, steps: int, per_turn: int, end: float, watched: bool = False) -> Trajectory:
+    """March to Ω_ref t = end, saving each twelfth of a revolution and the end, before which the steps are shorter."""
+    every, dt = per_turn // SAVES, 2 * np.pi / per_turn
+
+    def go(x: CoupledState, t: float, dt: float, count: int) -> Trajectory:
+        return march(driven, x, t, dt, count, driver, start.p, save_every=every, progress=watched)
+
+    if steps == every:
+        return go(start.x, 0.0, end / every, every)
+    whole = go(start.x, 0.0, dt, steps - every)
+    if not whole.finished:
+        return whole
+    t = (steps - every) * dt
+    last = go(whole.last, t, (end - t) / every, every)
+    t, x = jax.tree.map(lambda a, b: jnp.concatenate([a, b[1:]]), (whole.t, whole.x), (last.t, last.x))
+    return Trajectory(t, x, last.finished, last.why)
 
 
 def _outputs(t: Float[Array, " T"], x: CoupledState, driver: Driver, p: Coupled) -> tuple[RotorInputs, Outputs]:

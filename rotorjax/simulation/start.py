@@ -1,5 +1,6 @@
 """Where a flight starts: the trim that its case asks for, with any inflow."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -11,74 +12,73 @@ from rotorjax.coupled import Coupled, CoupledState, RotorState
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.errors import InputError
 from rotorjax.ground import pitched
-from rotorjax.rotor import catalogue, multiblade
+from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import SimulationCase
-from rotorjax.trim import in_wake_run
-from rotorjax.trim.dispatch import check_request
 from rotorjax.trim.in_wake import TrimmedInWake
-from rotorjax.trim.in_wake_run import WakeResult
 from rotorjax.trim.problem import inputs_at
-from rotorjax.trim.run import Result
-from rotorjax.trim.run import run as run_trim
+from rotorjax.trim.run import FREE_WAKE, run
+from rotorjax.trim.solve import Trimmed
 from rotorjax.wake.equilibrium import full_state
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 
 
 @dataclass(frozen=True)
 class Start:
-    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad)."""
+    """A trim as a flight needs it. x: state with blade 0 at ψ = 0. tilt: of the shaft, forward (rad).
+
+    CT, CQ: the trim's means over a revolution; NaN where they are not known.
+    """
 
     p: Coupled
     x: CoupledState
     inputs: RotorInputs
     tilt: float
+    CT: float = math.nan
+    CQ: float = math.nan
 
 
 def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None) -> Start:
     """Trim. Raises InputError where the flight is not allowed or does not trim."""
-    check_request(case.request)
-    if case.request.inflow == in_wake_run.NAME:
 
-        def show(stage: str, residual: float) -> None:
-            if progress is not None:
-                progress(f"{stage}, residual {residual:.1e}")
+    def show(stage: str, residual: float) -> None:
+        if progress is not None:
+            progress(f"{stage}, residual {residual:.1e}")
 
-        result = in_wake_run.run_in_wake(case.request, settings_of(case), show)
-        found = from_wake(result)
-    else:
-        result = run_trim(case.request)
-        found = from_trim(result)
-    if not result.trimmed.outcome.converged:
-        raise InputError(f"[flight] must be a flight that can be trimmed, but: {result.trimmed.outcome.why}")
-    return found
+    wake = settings_of(case) if case.request.inflow == FREE_WAKE else None
+    result = run(replace(case.request, wake=wake), progress=show)
+    found = result.trimmed
+    if not found.outcome.converged:
+        raise InputError(f"[flight] must be a flight that can be trimmed, but: {found.outcome.why}")
+    start = from_wake(found) if isinstance(found, TrimmedInWake) else from_trim(found)
+    return replace(start, CT=result.means.CT, CQ=result.means.CQ)
 
 
 def settings_of(case: SimulationCase) -> WakeSettings:
     """Settings of the free wake: those of its trim, with what the case has of its own. Raises InputError as they do."""
-    blades = catalogue.load(case.request.rotor)[0].blades
+    blades = case.request.rotor.blades
     if case.request.advance:
         return flight_settings(blades, **case.wake)
     return wake_settings(**{"azimuths": 2 * blades, **case.wake})
 
 
-def from_trim(result: Result) -> Start:
+def from_trim(trimmed: Trimmed) -> Start:
     """Start from a trim with an inflow model."""
-    z = result.z
+    z = trimmed.z
     x = CoupledState(jnp.zeros(()), *jax.tree.map(lambda v: v[0], (z.rotor, z.inflow)))
-    return Start(result.p, x, inputs_at(z.controls, result.flight), float(z.controls.tilt))
+    return Start(trimmed.p, x, inputs_at(z.controls, trimmed.flight), float(z.controls.tilt))
 
 
-def from_wake(result: WakeResult) -> Start:
+def from_wake(trimmed: TrimmedInWake) -> Start:
     """Start from a trim in the free wake."""
-    trimmed = result.trimmed
     model, p = trimmed.model, trimmed.p
-    ground = model.ground if model.ground is None else pitched(model.ground, jnp.asarray(result.tilt))
+    tilt = 0.0 if p.inputs.pitch is None else -float(p.inputs.pitch)
+    ground = model.ground if model.ground is None else pitched(model.ground, jnp.asarray(tilt))
     height = None if ground is None else ground.height
     theta_0, theta_1c, theta_1s = trimmed.z.controls
     inputs = replace(p.inputs, theta_0=theta_0, theta_1c=theta_1c, theta_1s=theta_1s, height=height)
     coupled = CoupledWake(model.rotor, model.operating, p.blade, ground, model.settings)
-    return Start(coupled, state_at(trimmed, 0), inputs, result.tilt)
+    return Start(coupled, state_at(trimmed, 0), inputs, tilt)
 
 
 def state_at(trimmed: TrimmedInWake, slice_: int) -> CoupledState:

@@ -107,7 +107,9 @@ def wake_arrays(found: Simulated, at: np.ndarray) -> dict[str, xr.DataArray]:
             np.asarray(getattr(looks, name)), own, axes, attrs={"long_name": f"{name} {unit}"}
         )
     told = {"long_name": "rms distance over R of the nodes from where they were a revolution before"}
-    return arrays | {"wake_change": xr.DataArray(change(found.flown.x), dims=("time",), attrs=told)}
+    moved = change(found.flown.x)
+    moved[-1] = np.nan if found.finished else moved[-1]  # the end comes less than a twelfth of a turn after the rest
+    return arrays | {"wake_change": xr.DataArray(moved, dims=("time",), attrs=told)}
 
 
 def change(x: CoupledState) -> Float[np.ndarray, " T"]:

@@ -46,7 +46,7 @@ def wake_film(data: xr.Dataset, thrust: np.ndarray, path: str | Path, frames_per
             drawn.append((title, _lines(axes, data, title)))
         history.plot(t, thrust, color=plotting.FREE_WAKE)
         (dot,) = history.plot([], [], "o", color=plotting.INK, ms=5)
-        history.set(xlabel="time, s", ylabel=r"$C_T$, mean over a revolution")
+        history.set(xlabel="time, s", ylabel=r"$C_T$, mean over the last revolution")
 
         def draw(frame: int) -> None:
             one = data.isel(frame=frame)

@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rotorjax.bench.azimuth import valley_side
 from rotorjax.bench.cases import SLOPE_HEIGHT, STEEP_DEG, Case
 from rotorjax.bench.dataset import present, select
 from rotorjax.bench.plotting import (
@@ -48,21 +49,20 @@ def draw_all(
     return drawn, missing
 
 
-def profile(data: xr.Dataset, model: str, reference: float, azimuth: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Radii and normalised inflow of a model at one azimuth; VPBFSM on the fine grid."""
-    if model == "free_wake":
-        return data["radius"].to_numpy(), data["free_wake_inflow"].to_numpy()[azimuth] / reference
-    if model == "vpbfsm":
-        return data["grid_radius"].to_numpy(), data["vpbfsm_inflow_grid"].to_numpy()[azimuth] / reference
-    return data["grid_radius"].to_numpy(), data["exact_image_inflow_diameter"].to_numpy()[azimuth] / reference
+def profile(data: xr.Dataset, model: str, reference: float) -> tuple[np.ndarray, np.ndarray]:
+    """Radii and normalised inflow (K, R) of a model at equally spaced azimuths; VPBFSM on the fine grid."""
+    radius, inflow = {
+        "free_wake": ("radius", "free_wake_inflow"),
+        "vpbfsm": ("grid_radius", "vpbfsm_inflow_grid"),
+        "exact_image": ("grid_radius", "exact_image_inflow_diameter"),
+    }[model]
+    return data[radius].to_numpy(), data[inflow].to_numpy() / reference
 
 
 def across_disk(data: xr.Dataset, model: str, reference: float) -> tuple[np.ndarray, np.ndarray]:
     """Normalised inflow of a model from the valley's tip over the hub to the mountain's."""
-    opposite = {"free_wake": data.sizes["azimuth"] // 2, "vpbfsm": data.sizes["grid_azimuth"] // 2, "exact_image": 1}
-    r, mountain = profile(data, model, reference)
-    _, valley = profile(data, model, reference, opposite[model])
-    return across(r, mountain, valley)
+    r, inflow = profile(data, model, reference)
+    return across(r, inflow[0], valley_side(inflow))
 
 
 def loading_by_height(merged: xr.Dataset) -> Figure | None:
@@ -102,7 +102,8 @@ def inflow_by_terms(merged: xr.Dataset) -> Figure | None:
     reference = float(merged["reference_inflow"])
     figure = new_figure()
     axes = figure.add_subplot()
-    axes.plot(*profile(data, "free_wake", reference), color=INK, marker="o", label="free wake")
+    r, inflow = profile(data, "free_wake", reference)
+    axes.plot(r, inflow[0], color=INK, marker="o", label="free wake")
     terms = merged["terms"].to_numpy()
     for i, colour in enumerate(series_colours(len(terms))):
         curve = merged["vpbfsm_inflow_by_terms"][i] / reference
@@ -210,7 +211,7 @@ def overview(merged: xr.Dataset) -> Figure | None:
     field = merged.sel(case=sloped.name)["free_wake_dct_dr"].to_numpy()
     radius, azimuth = merged["radius"].to_numpy(), merged["azimuth"].to_numpy()
     filled = polar_contour(axes, radius, azimuth, field, shared_levels([field]))
-    axes.set_title(f"{sloped.label}: free wake's loading", pad=18)
+    axes.set_title(f"{sloped.label}: free wake's loading", pad=24)
     figure.colorbar(filled, ax=axes, label=LOADING, shrink=0.75, pad=0.12)
     return figure
 

@@ -8,10 +8,12 @@ from json import loads
 import numpy as np
 import xarray as xr
 
+from rotorjax.bench.azimuth import valley_side
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import present
 from rotorjax.bench.flapping import flap_harmonics_deg
 from rotorjax.bench.markdown import table
+from rotorjax.bench.wake_file import lost_at
 from rotorjax.study.claim import Claim
 from rotorjax.study.claims import checks, paper_claims
 from rotorjax.study.divergence import where_they_part
@@ -78,7 +80,10 @@ def _case_table(reading: Reading) -> str:
             reading.number(case, name) if name in reading.merged else float("nan") for name in names
         ]
         values[5] = "yes" if values[5] else "**no**"
-        rows.append([case.label, *values])
+        lost = lost_at(reading.merged.sel(case=case.name))
+        rows.append(
+            [case.label if lost is None else f"{case.label} (**lost at {lost}**, whose numbers these are)", *values]
+        )
     note = (
         "\n\nResidual: rms node displacement when the wake is passed once through its own velocities. ΔC_T: relative "
         "change of C_T in that pass. Ground: rms normal velocity on the plane, over √(C_T/2) for the free wake and "
@@ -148,11 +153,11 @@ def _along_radius(reading: Reading, cases: Sequence[Case], name: str, scale: flo
         if not reading.has(case):
             continue
         field = reading.field(case, name) * scale
-        sides = {"": 0}
+        sides = {"": field[0]}
         if case.slope_deg and valley:
-            sides = {", mountain": 0, ", valley": field.shape[0] // 2}
-        for side, k in sides.items():
-            rows.append([case.label + side, *(float(np.interp(r, reading.r, field[k])) for r in TABLE_R)])
+            sides = {", mountain": field[0], ", valley": valley_side(field)}
+        for side, values in sides.items():
+            rows.append([case.label + side, *(float(np.interp(r, reading.r, values)) for r in TABLE_R)])
     return table(["r̄ =", *map(str, TABLE_R)], rows) if rows else ""
 
 

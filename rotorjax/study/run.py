@@ -1,8 +1,8 @@
 """The study itself: solve the cases in order, keep each as it finishes, then write pictures, tables and report."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from json import loads
 from pathlib import Path
 from threading import Thread
 
@@ -14,11 +14,9 @@ from rotorjax.bench.cases import Case, neighbour
 from rotorjax.bench.flapping import flapping_dataset
 from rotorjax.bench.record import add_finite_state
 from rotorjax.bench.schedule import Schedule
-from rotorjax.bench.settings import StudySettings, differences
+from rotorjax.bench.settings import StudySettings
 from rotorjax.bench.single import Progress, Solver, solve_wake
-from rotorjax.errors import InputError
-from rotorjax.io import netcdf
-from rotorjax.io.atomic import make_folder
+from rotorjax.study import kept
 from rotorjax.trim.held import let_flap
 from rotorjax.wake.solution import rehearse, solve
 
@@ -42,11 +40,12 @@ def solve_cases(
 ) -> StudyResult:
     """Solve all cases of a study, keeping each in folder/cases as soon as it is done; what is there is not redone.
 
+    A kept file that is damaged or holds another case is set aside with a line on stderr, and its case solved again.
     show: progress bar. workers: threads. A case that does not converge is kept with its last good state, and no other
     starts from it. Raises InputError where the folder cannot be written or holds another study.
     """
-    kept = make_folder(make_folder(folder) / "cases")
-    found = {case: _reload(kept / f"{case.name}.nc", settings) for case in cases if (kept / f"{case.name}.nc").exists()}
+    folder = Path(folder)
+    found = kept.take_up(folder, cases, settings, lambda line: tqdm.write(line, file=sys.stderr))
     todo = [case for case in cases if case not in found]
     with tqdm(total=len(cases), initial=len(found), desc="study", unit="case", disable=not show) as bar:
 
@@ -58,7 +57,7 @@ def solve_cases(
             return solve_case(case, settings, found | done, progress, solver)
 
         def keep(case: Case, data: xr.Dataset) -> None:
-            netcdf.write(kept / f"{case.name}.nc", data)
+            kept.keep(folder, case, data)
             bar.update(1)
             if not bool(data["converged"]):
                 bar.write(f"{case.label} did not converge: {data.attrs['why']}")
@@ -101,14 +100,3 @@ def solve_case(
     else:
         data = wake_file.to_dataset(case, rigid, settings)
     return add_finite_state(data, settings)
-
-
-def _reload(path: Path, settings: StudySettings) -> xr.Dataset:
-    data = netcdf.read(path)
-    if data.attrs.get("fingerprint") == settings.fingerprint():
-        return data
-    ours, theirs = settings.table(), loads(data.attrs.get("settings", "{}"))
-    what = ", ".join(differences(ours, theirs)[:3]) or "other settings"
-    raise InputError(
-        f"{path.parent.parent}: the output folder must be new or of the same study, but holds one with {what}"
-    )

@@ -22,7 +22,7 @@ from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.trim.free_wake import InWake, WakeTrim, blade_defect, flown, harmonic, loads_of
 from rotorjax.trim.in_wake import TrimmedInWake
-from rotorjax.trim.wake_means import means
+from rotorjax.trim.means import means
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.equilibrium import Unknowns, evaluate, evaluated, transported
 from rotorjax.wake.model import FreeWake

@@ -170,7 +170,7 @@ def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimmed
     thick = _with_cores(replace(p, aim="flapping"), THICKER)
     first = stages.done(
         "prescribed wake",
-        anderson(residual, guess, thick, mixing=0.3, window=15, tol=5e-4, max_iterations=150, difference=True),
+        anderson(residual, guess, thick, mixing=0.3, window=15, tol=5e-4, max_iterations=150, linear=Krylov()),
     )
     outcome = stages.newton("thick cores", first.x, thick, 1e-5)
     if outcome.converged:

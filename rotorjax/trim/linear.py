@@ -16,7 +16,7 @@ from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import Orbit, make_orbit
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.trim.problem import Flight, inputs_at, revolution
+from rotorjax.trim.problem import inputs_at, revolution
 from rotorjax.trim.solve import Trimmed
 
 OUTPUTS = ("CT", "CQ", "force", "moment")
@@ -48,8 +48,6 @@ def orbit_of(found: Trimmed) -> Orbit:
 
 def linear_model(
     found: Trimmed,
-    flight: Flight,
-    p: CoupledRotor,
     inputs: Sequence[str] | None = None,
     kept: Sequence[str] | None = OUTPUTS,
     nodes: int | None = None,
@@ -59,6 +57,6 @@ def linear_model(
     inputs, kept: names of inputs (fields of `RotorInputs`) and outputs (of `Outputs`), None for all. nodes: azimuths.
     Raises InputError where the trim has not converged or a name is unknown.
     """
-    u = inputs_at(found.z.controls, flight)
+    u = inputs_at(found.z.controls, found.flight)
     orbit = orbit_of(found)
-    return linearise(rates, outputs, orbit, u, p, inputs=inputs, outputs=kept, units=UNITS, nodes=nodes)
+    return linearise(rates, outputs, orbit, u, found.p, inputs=inputs, outputs=kept, units=UNITS, nodes=nodes)

@@ -113,7 +113,7 @@ class TrimResidual(eqx.Module):
         rates, found = rates_and_outputs(z, flight, p)
         orbit = jax.tree.map(jnp.subtract, self.slopes(z), (rates.rotor, rates.inflow))
         force, moment = jnp.mean(found.force, axis=0), jnp.mean(found.moment, axis=0)
-        cosine, sine = (moment[1], moment[0]) if self.aim == "moments" else cyclic(found.flap, p)
+        cosine, sine = (moment[1], moment[0]) if self.aim == "moments" else cyclic(found.flap)
         tilt = z.controls.tilt - flight.tilt
         if self.balance:
             forward = force[2] * jnp.sin(z.controls.tilt) - force[0] * jnp.cos(z.controls.tilt)
@@ -145,8 +145,8 @@ def outputs_at(z: Trim, flight: Flight, p: CoupledRotor) -> Outputs:
     return rates_and_outputs(z, flight, p)[1]
 
 
-def cyclic(flap: Float[Array, "K B"], p: CoupledRotor) -> tuple[Float[Array, ""], Float[Array, ""]]:
-    """First harmonics β_1c and β_1s (rad) of a blade's flap over a revolution."""
+def cyclic(flap: Float[Array, "K B"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """First harmonics β_1c and β_1s (rad) of a blade's flap, or of its lag, over a revolution."""
     nodes, blades = flap.shape
     psi = 2 * jnp.pi / (nodes * blades) * jnp.arange(nodes)[:, None] + 2 * np.pi / blades * np.arange(blades)
     return 2 * jnp.mean(flap * jnp.cos(psi)), 2 * jnp.mean(flap * jnp.sin(psi))

@@ -1,31 +1,45 @@
-"""A trim from what a user asks for, and the numbers that it comes to."""
+"""A trim from what a user asks for, with any inflow, and the numbers that it comes to."""
 
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax.checks import check_number
+from rotorjax.checks import check_number, closest
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
-from rotorjax.ground import plane
-from rotorjax.inflow.choice import inflow_model
+from rotorjax.ground import Plane, plane
+from rotorjax.inflow.choice import NAMES, inflow_model
 from rotorjax.limits import check_flight, check_place
+from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import catalogue
-from rotorjax.rotor.geometry import solidity
-from rotorjax.trim.problem import Aim, Flight, Trim, TrimResidual, cyclic, outputs_at
+from rotorjax.rotor.flap_lag import blade_of
+from rotorjax.rotor.geometry import Rotor, solidity
+from rotorjax.trim import problem
+from rotorjax.trim.in_wake import TrimmedInWake, trim_in_wake, wake_trim
+from rotorjax.trim.means import Means, means
+from rotorjax.trim.problem import Aim, TrimResidual, inputs_at, outputs_at
 from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, trim
+from rotorjax.wake.settings import WakeSettings
+
+Progress = Callable[[str, float], None]
+FREE_WAKE = "freewake"
+INFLOWS = (*NAMES, FREE_WAKE)
 
 
 @dataclass(frozen=True)
 class Request:
     """What to trim. thrust: C_T. height over R; slope, tilt in degrees; climb over ΩR; drag_area: f of the fuselage in
-    m², balanced by tilting the shaft, or None for a given tilt. aim: no cyclic flapping, or no hub moments.
+    m², balanced by tilting the shaft, or None for a given tilt. aim: no cyclic flapping, or no hub moments. wake:
+    settings of the free wake, None for those that suit the flight.
     """
 
-    rotor: str
+    rotor: Rotor
+    operating: OperatingPoint
     thrust: float
     inflow: str = "pitt-peters"
     advance: float = 0.0
@@ -36,26 +50,50 @@ class Request:
     drag_area: float | None = None
     aim: Aim = "flapping"
     azimuths: int = AZIMUTHS
+    wake: WakeSettings | None = None
+
+    @property
+    def ground(self) -> Plane | None:
+        """The ground, in level axes."""
+        return None if self.height is None else plane(self.height, self.slope_deg)
+
+    @property
+    def flight(self) -> problem.Flight:
+        """The flight condition in rotor units. Raises InputError where something of it is not allowed."""
+        area = np.pi * float(self.rotor.radius) ** 2
+        share = 0.0 if self.drag_area is None else self.drag_area / area
+        return flight(self.thrust, self.advance, self.climb, np.deg2rad(self.tilt_deg), share, self.height)
 
 
 @dataclass(frozen=True)
 class Result:
-    """A trim and what it took. wall_time_s: compilation included."""
+    """A trim and what it took. trimmed: with the states of an inflow model, or in the free wake. wall_time_s:
+    compilation included.
+    """
 
     request: Request
-    p: CoupledRotor
-    flight: Flight
-    trimmed: Trimmed
+    trimmed: Trimmed | TrimmedInWake
+    means: Means
     wall_time_s: float
 
     @property
-    def z(self) -> Trim:
-        """States and controls."""
-        return self.trimmed.z
+    def converged(self) -> bool:
+        """Whether it is a trim."""
+        return self.trimmed.outcome.converged
+
+
+def request(rotor: str | Path, thrust: float, *arguments: Any, **more: Any) -> Request:
+    """A request for a rotor of the catalogue or a file; other arguments as `Request` takes them after the thrust."""
+    return Request(*catalogue.load(rotor), thrust, *arguments, **more)
 
 
 def check(request: Request) -> None:
-    """Raise InputError where something of a request is not allowed, whatever the inflow."""
+    """Raise InputError where something of a request is not allowed, before any work."""
+    if request.inflow not in INFLOWS:
+        raise InputError(
+            f"Argument `inflow` must be one of {', '.join(INFLOWS)}, but is '{request.inflow}': "
+            f"{closest(request.inflow, INFLOWS)}"
+        )
     if request.slope_deg and request.height is None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
@@ -63,89 +101,89 @@ def check(request: Request) -> None:
     check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
     check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
     check_flight(request.inflow, request.thrust, request.climb, request.advance)
-    check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
     if request.height is not None and request.climb:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), but is {request.climb:g}"
         )
-
-
-def prepare(request: Request) -> tuple[CoupledRotor, Flight, TrimResidual]:
-    """Rotor, flight and equations of a request. Raises InputError where something of it is not allowed."""
-    check(request)
-    rotor, operating = catalogue.load(request.rotor)
-    if float(operating.climb):
+    if float(request.operating.climb):
         raise InputError(
-            f"[operating] climb must be 0 in a rotor file that is trimmed, but is {float(operating.climb):g} m/s, "
-            "which has no effect: give the climb to the trim"
+            "[operating] climb must be 0 in a rotor file that is trimmed, but is "
+            f"{float(request.operating.climb):g} m/s, which has no effect: give the climb to the trim"
         )
-    ground = None if request.height is None else plane(request.height, request.slope_deg)
-    p = coupled_rotor(rotor, operating, inflow_model(request.inflow, ground))
-    area = np.pi * float(rotor.radius) ** 2
-    condition = flight(
-        request.thrust,
-        request.advance,
-        request.climb,
-        float(np.deg2rad(request.tilt_deg)),
-        0.0 if request.drag_area is None else request.drag_area / area,
-        request.height,
-    )
-    return p, condition, TrimResidual(rotor.blades, request.aim, request.drag_area is not None)
+    blade_of(request.rotor, request.operating)
+    _ = request.flight, request.ground
+    if request.inflow != FREE_WAKE:
+        inflow_model(request.inflow, request.ground)
+    check_place(request.inflow, request.height, request.slope_deg)
 
 
-def run(request: Request, start: Trim | None = None, progress: bool = False) -> Result:
-    """Trim. Raises InputError where something of the request is not allowed or the thrust is out of reach."""
+def run(request: Request, start: Result | None = None, progress: Progress | None = None) -> Result:
+    """Trim. start: a trim nearby, of no use to the free wake. progress(stage, residual): called now and then.
+
+    Raises InputError where something of the request is not allowed or the thrust is out of reach.
+    """
     begun = time.perf_counter()
-    p, condition, residual = prepare(request)
-    found = trim(p, condition, residual, start, request.azimuths, progress)
-    return Result(request, p, condition, found, time.perf_counter() - begun)
+    check(request)
+    near = None if start is None or not isinstance(start.trimmed, Trimmed) else start.trimmed.z
+    found = _in_wake(request, progress) if request.inflow == FREE_WAKE else _in_model(request, near)
+    return Result(request, found, means(found), time.perf_counter() - begun)
+
+
+def prepare(request: Request) -> tuple[CoupledRotor, problem.Flight, TrimResidual]:
+    """Rotor, flight and equations of a request with an inflow model."""
+    check(request)
+    p = coupled_rotor(request.rotor, request.operating, inflow_model(request.inflow, request.ground))
+    return p, request.flight, TrimResidual(request.rotor.blades, request.aim, request.drag_area is not None)
+
+
+def _in_model(request: Request, start: problem.Trim | None) -> Trimmed:
+    return trim(*prepare(request), start, request.azimuths)
+
+
+def _in_wake(request: Request, progress: Progress | None) -> TrimmedInWake:
+    """Controls and coning are first guessed with Pitt-Peters' inflow; a fuselage's drag is balanced by its tilt."""
+    guess = _in_model(replace(request, inflow="pitt-peters", height=None, slope_deg=0.0), None)
+    if not guess.outcome.converged:
+        raise InputError(
+            f"Argument `thrust_coefficient` must be within the rotor's reach, but at {request.thrust:g} no trim is "
+            f"found even with Pitt-Peters' inflow ({guess.outcome.why}): lower it"
+        )
+    controls = guess.z.controls
+    coning = float(jnp.mean(outputs_at(guess.z, guess.flight, guess.p).flap))
+    inputs = inputs_at(controls, guess.flight)
+    p = wake_trim(request.rotor, request.operating, inputs, request.thrust, request.ground, request.wake, request.aim)
+    start = jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s])
+    return trim_in_wake(p, start, coning, progress)
 
 
 def numbers(result: Result) -> dict[str, Any]:
     """What --json writes: angles in degrees, coefficients over ρA(ΩR)² and, for power, ρA(ΩR)³."""
-    z, p = result.z, result.p
-    out = outputs_at(z, result.flight, p)
-    cosine, sine = cyclic(out.flap, p)
-    controls = z.controls
-
-    def mean(v: Any) -> float:
-        return float(jnp.mean(v))
-
-    def degrees(v: Any) -> float:
-        return float(np.rad2deg(v))
-
-    moment = np.asarray(jnp.mean(out.moment, axis=0))
-    thrust, power = mean(out.CT), mean(out.CQ)
+    request, outcome, flown = result.request, result.trimmed.outcome, result.means
+    names = ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s", "lag_0")
+    angles = np.rad2deg([*flown.controls, *flown.flap, flown.lag[0]])
     return {
-        "rotor": p.rotor.name,
-        "inflow": result.request.inflow,
-        "converged": result.trimmed.outcome.converged,
-        "why": result.trimmed.outcome.why,
-        "residual": result.trimmed.outcome.residual,
-        "iterations": result.trimmed.outcome.iterations,
-        "advance_ratio": float(result.flight.advance),
-        "height": result.request.height,
-        "slope_deg": result.request.slope_deg,
-        "collective_deg": degrees(controls.theta_0),
-        "theta_1c_deg": degrees(controls.theta_1c),
-        "theta_1s_deg": degrees(controls.theta_1s),
-        "tilt_deg": degrees(controls.tilt),
-        "beta_0_deg": degrees(mean(out.flap)),
-        "beta_1c_deg": degrees(cosine),
-        "beta_1s_deg": degrees(sine),
-        "lag_0_deg": degrees(mean(out.lag)),
-        "CT": thrust,
-        "CT_over_solidity": thrust / float(solidity(p.rotor)),
-        "CP": power,
-        "CP_induced": mean(out.CP_induced),
-        "CP_profile": mean(out.CP_profile),
-        "CP_parasite": mean(out.CP_parasite),
-        "CP_damper": mean(out.CP_damper),
-        "hub_roll_moment": -float(moment[0]),
-        "hub_pitch_moment": float(moment[1]),
-        "figure_of_merit": figure_of_merit(thrust, power, result.request),
+        "rotor": request.rotor.name,
+        "inflow": request.inflow,
+        "converged": outcome.converged,
+        "why": outcome.why,
+        "residual": outcome.residual,
+        "iterations": result.trimmed.iterations,
+        "advance_ratio": request.advance,
+        "height": request.height,
+        "slope_deg": request.slope_deg,
+        **{f"{name}_deg": float(value) for name, value in zip(names, angles, strict=True)},
+        "CT": flown.CT,
+        "CT_over_solidity": flown.CT / float(solidity(request.rotor)),
+        "CP": flown.CQ,
+        "CP_induced": flown.CP_induced,
+        "CP_profile": flown.CP_profile,
+        "CP_parasite": flown.CP_parasite,
+        "CP_damper": flown.CP_damper,
+        "hub_roll_moment": -float(flown.moment[0]),
+        "hub_pitch_moment": float(flown.moment[1]),
+        "figure_of_merit": figure_of_merit(flown.CT, flown.CQ, request),
         "wall_time_s": result.wall_time_s,
     }
 

@@ -24,11 +24,18 @@ AZIMUTHS = 24  # of a revolution
 
 @dataclass(frozen=True)
 class Trimmed:
-    """A trim, converged or not. z: unknowns. outcome: how Newton ended."""
+    """A trim, converged or not. z: unknowns. outcome: how Newton ended. flight, p: what was trimmed."""
 
     z: Trim
     outcome: Outcome
     residual: TrimResidual
+    flight: Flight
+    p: CoupledRotor
+
+    @property
+    def iterations(self) -> int:
+        """Newton's."""
+        return self.outcome.iterations
 
 
 def flight(
@@ -123,7 +130,7 @@ def trim(
         )
     z = guess(p, flight, azimuths) if start is None else start
     outcome = newton(residual, z, flight, p, tol=TOL, measure=largest, progress=progress)
-    found = Trimmed(outcome.x, outcome, residual)
+    found = Trimmed(outcome.x, outcome, residual, flight, p)
     return found if outcome.converged or start is not None else _raised(found, p, flight, azimuths)
 
 
@@ -141,7 +148,7 @@ def _raised(failed: Trimmed, p: CoupledRotor, flight: Flight, azimuths: int) -> 
             continue
         reached, z = target, outcome.x
         if reached == wanted:
-            return Trimmed(z, outcome, failed.residual)
+            return Trimmed(z, outcome, failed.residual, flight, p)
     why = (
         f"out of reach: raised in steps, the rotor trims up to C_T = {reached:.4g}; at {wanted:g}: {failed.outcome.why}"
     )

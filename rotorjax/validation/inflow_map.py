@@ -22,13 +22,12 @@ from rotorjax.inflow.finite_state import FiniteStateInflow
 from rotorjax.potential.dynamics import with_ground
 from rotorjax.potential.model import velocity
 from rotorjax.rotor.geometry import chord
-from rotorjax.trim.dispatch import ALL, numbers_of, trim_request
+from rotorjax.trim import run as trimming
 from rotorjax.trim.free_wake import InWake, flown
-from rotorjax.trim.in_wake_run import NAME as FREE_WAKE
-from rotorjax.trim.in_wake_run import WakeResult
+from rotorjax.trim.in_wake import TrimmedInWake
+from rotorjax.trim.means import evaluated
 from rotorjax.trim.problem import inputs_at
-from rotorjax.trim.run import Request, Result
-from rotorjax.trim.wake_means import evaluated
+from rotorjax.trim.run import FREE_WAKE, INFLOWS, Request, Result
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.point import Point
 from rotorjax.validation.row import Against, Row, between, relative
@@ -95,15 +94,16 @@ def rms(weights: Float[np.ndarray, " N"], values: Float[np.ndarray, " N"]) -> fl
 
 def request(inflow: str) -> Request:
     """The measured flight."""
-    return Request("elliott_althoff", THRUST, inflow, ADVANCE, tilt_deg=TILT_DEG)
+    return trimming.request("elliott_althoff", THRUST, inflow, ADVANCE, tilt_deg=TILT_DEG)
 
 
-def map_of(result: Result | WakeResult) -> Map:
+def map_of(result: Result) -> Map:
     """Mean inflow of a trim, one chord above the disk where the model reaches there, else on it."""
-    if isinstance(result, WakeResult):
-        return _wake_map(result)
-    state = jax.tree.map(lambda v: jnp.mean(v, axis=0), result.z.inflow)
-    inputs, p = inputs_at(result.z.controls, result.flight), result.p
+    found = result.trimmed
+    if isinstance(found, TrimmedInWake):
+        return _wake_map(found)
+    state = jax.tree.map(lambda v: jnp.mean(v, axis=0), found.z.inflow)
+    inputs, p = inputs_at(found.z.controls, found.flight), found.p
 
     def at(places: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, " N"]:
         points = _cartesian(places)
@@ -117,13 +117,12 @@ def map_of(result: Result | WakeResult) -> Map:
     return at
 
 
-def _wake_map(result: WakeResult) -> Map:
+def _wake_map(trimmed: TrimmedInWake) -> Map:
     """Mean over the azimuths of the free wake.
 
     Blades pass a chord below the points with upflow ahead of them and downflow behind. A few azimuths miss their
     balance where blades lag: the trim's harmonics are evaluated at more, and points stand for the arc between two.
     """
-    trimmed = result.trimmed
     z = _finer(trimmed.z)
     model, state = flown(z, trimmed.p), evaluated(z, trimmed.p)[0].state
     height = chord(model.rotor, jnp.asarray(0.75))
@@ -157,19 +156,19 @@ def points(subject: Subject) -> tuple[Point, ...]:
 def compare(subject: Subject, wakes: Wakes) -> Comparison:
     """Trim with each inflow model, in a quick look without the free wake; rows and picture."""
     data = measured()
-    names = [name for name in ALL if name != FREE_WAKE or not subject.quick]
-    trims = {name: trim_request(request(name)) for name in names}
+    names = [name for name in INFLOWS if name != FREE_WAKE or not subject.quick]
+    trims = {name: trimming.run(request(name)) for name in names}
     maps = {name: map_of(result) for name, result in trims.items()}
     return Comparison(rows(data, trims, maps), lambda: draw(data, maps))
 
 
-def rows(data: Measured, trims: Mapping[str, Result | WakeResult], maps: Mapping[str, Map]) -> list[Row]:
+def rows(data: Measured, trims: Mapping[str, Result], maps: Mapping[str, Map]) -> list[Row]:
     """Rms over the disk, each below the next simpler model's, and the mean."""
     places = np.stack([data.r, data.psi], axis=1)
     found = []
     limits = {"uniform": rms(data.area, data.inflow)}  # no inflow at all
     for name, field in maps.items():
-        told = numbers_of(trims[name])
+        told = trimming.numbers(trims[name])
         note = "" if told["converged"] else f"not converged: {told['why']}"
         ours = field(places)
         error = rms(data.area, ours - data.inflow) if told["converged"] else float("nan")

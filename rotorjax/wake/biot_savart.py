@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
+from rotorjax.wake.kernel_pairs import cross, dot, influence, loose_pairs, nonzero
 from rotorjax.wake.kernel_rule import BiotSavart
 from rotorjax.wake.kernel_sweeps import Segments, Settings
 
@@ -113,22 +114,42 @@ def _velocity(settings, points, start, end, strength, core, plane: Plane | None,
 
     A copy's velocity is the segments' own at the point turned (or reflected) back, turned (or reflected) with the copy.
     """
-    soft = jnp.sum((end - start) ** 2, axis=1) * core**2
-    segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
-    angles = [2 * jnp.pi * b / blades for b in range(blades)]
-    sides = [points] if plane is None else [points, plane.reflect_points(points)]
-    places = [rotate_about_shaft(side, jnp.asarray(-a, points.dtype)) for side in sides for a in angles]
     if not points.shape[0] or not strength.shape[0]:
         return jnp.zeros_like(points)
-    everywhere = jnp.concatenate(places).T
-    parts = jnp.split(BiotSavart(settings, everywhere, segments)(everywhere, segments).T, len(places))
-    turned = [
-        rotate_about_shaft(v, jnp.asarray(a, points.dtype)) for v, a in zip(parts, angles * len(sides), strict=True)
-    ]
-    direct = sum(turned[1:blades], turned[0])
-    if plane is None:
-        return direct
-    return direct + plane.reflect_vectors(sum(turned[blades + 1 :], turned[blades]))
+    soft = jnp.sum((end - start) ** 2, axis=1) * core**2
+    segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
+    angles = (2 * np.pi / blades * np.arange(blades, dtype=points.dtype))[:, None]
+    sides = points[None] if plane is None else jnp.stack([points, plane.reflect_points(points)])
+    # one sum for all copies, (sides, blades, N, 3)
+    copies = jnp.broadcast_to(sides[:, None], (len(sides), blades, *points.shape))
+    places = rotate_about_shaft(copies, -angles)
+    everywhere = places.reshape(-1, 3).T
+    found = BiotSavart(settings, everywhere, segments)(everywhere, segments).T.reshape(places.shape)
+    turned = jnp.sum(rotate_about_shaft(found, angles), axis=1)
+    return turned[0] if plane is None else turned[0] + plane.reflect_vectors(turned[1])
+
+
+def sharpened_velocity(
+    points: Float[Array, "N 3"],
+    start: Float[Array, "S 3"],
+    end: Float[Array, "S 3"],
+    strength: Float[Array, " S"],
+    core: Float[Array, " S"],
+    *,
+    fine: Float[Array, ""],
+) -> Float[Array, "N 3"]:
+    """What the velocity of `segment_velocity` (Scully's core) changes by as all cores shrink to `fine`.
+
+    For few points, none of them on a segment's end: all N × S pairs are stored. Both cores share their pairs, and the
+    difference of two nearly equal numbers is not taken: 1/(h + e₁) − 1/(h + e₂) = (e₂ − e₁)/((h + e₁)(h + e₂)).
+    """
+    length = jnp.sum((end - start) ** 2, axis=1)
+    pair = loose_pairs(tuple(points.T), tuple(start.T), tuple(end.T), length * core**2)
+    thin = (length * fine**2)[:, None]
+    c = cross(pair.edge, pair.r1)
+    sharper = influence(pair, 1) * (pair.soft - thin) / nonzero(dot(c, c) + thin)
+    weight = strength[:, None] / (4 * jnp.pi) * sharper
+    return jnp.sum(weight * jnp.stack(c), axis=1).T
 
 
 def _settings(exponent: float, blades: int, block: int | None, chained: bool) -> Settings:

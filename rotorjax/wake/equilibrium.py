@@ -14,6 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.ode.linear import Krylov
+from rotorjax.ode.outcome import ravelled, traceable, unravelled
 from rotorjax.rotor.blade_element import SectionLoads
 from rotorjax.wake.dynamics import blade_loads, inputs_of, leading_lines, operators
 from rotorjax.wake.field import Velocities, node_velocities
@@ -81,7 +83,24 @@ def advance(model: FreeWake, x: Unknowns) -> Unknowns:
 
 def residual(x: Unknowns, model: FreeWake) -> Unknowns:
     """How far one pass moves the wake: advance(x) − x; zero at the periodic equilibrium."""
-    return jax.tree.map(lambda new, old: new - old, advance(model, x), x)
+    return told(x, model)[0]
+
+
+def told(x: Unknowns, model: FreeWake) -> tuple[Unknowns, Evaluation]:
+    """The residual and the evaluation that it comes from, as `Krylov(tells=True)` wants them."""
+    found = evaluate(model, x)
+    return jax.tree.map(lambda new, old: new - old, transported(model, found), x), found
+
+
+METHOD = Krylov(forcing=0.03, restart=120, restarts=1, tells=True)
+"""How the search solves for Newton's direction, without a preconditioner."""
+
+
+def look(model: FreeWake, x: Unknowns) -> tuple[Unknowns, Evaluation]:
+    """`told` on the host, by the program that the search has compiled anyway."""
+    flat, unravel = ravelled(x)
+    value, place = METHOD.at(told, unravel, flat, traceable((model,)))
+    return unravelled(unravel, np.asarray(value)), place.told
 
 
 def displacement(moved: Unknowns) -> float:

@@ -188,8 +188,8 @@ def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray,
     settings = model.settings
     turns = (age - settings.filament_ages[0]) / (2 * np.pi)
     left = jnp.exp(-settings.inboard_decay * turns)
-    arms = (jnp.asarray(settings.inboard, float) / settings.release) ** 2
-    tip = strength[0] + settings.impulse_kept * (arms @ ((1 - left) * strength[1:]))
+    arms = (np.array(settings.inboard)[:, None] / settings.release) ** 2
+    tip = strength[0] + settings.impulse_kept * jnp.sum(arms * (1 - left) * strength[1:], axis=0)
     return jnp.concatenate([tip[None], left * strength[1:]])
 
 

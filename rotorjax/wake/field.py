@@ -4,14 +4,14 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.wake.biot_savart import segment_velocity
+from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
-from rotorjax.wake.roll_up import Release
-from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, near_lattice, releases
+from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
 
 
 class Velocities(NamedTuple):
@@ -36,77 +36,86 @@ def wake_segments(model: FreeWake, state: WakeState, psi: float | Float[Array, "
 
 def node_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Velocities:
     """Velocities at the blades' control points and at all wake nodes; slice 0 stands at azimuth psi."""
+    angles = azimuths(state, psi)
+    numbers = jnp.arange(slices(state))
+    control = jax.vmap(lambda k: model.of_slice(k).control)(numbers)
+    nodes = [a.reshape(len(a), -1, 3) for a in (control, state.near, state.far)]
+    targets = jnp.concatenate(nodes, axis=1)
     segments = wake_segments(model, state, psi)
-
-    def one(operand):
-        k, angle, slice_ = operand
-        own = model.of_slice(k)
-        points = own.control
-        targets = jnp.concatenate([points, slice_.near.reshape(-1, 3), slice_.far.reshape(-1, 3)])
-        v = _at_slice(model, segments, targets, k, angle)
-        split = len(points), len(points) + slice_.near.size // 3
-        control, near, far = jnp.split(v, split)
-        control = control + _sharpened(own, slice_, points)
-        far = far.reshape(slice_.far.shape) + self_induction(own, slice_)
-        return control, near.reshape(slice_.near.shape), far
-
-    operands = (jnp.arange(slices(state)), azimuths(state, psi), state)
-    if slices(state) == 1:
-        return Velocities(*(v[None] for v in one(jax.tree.map(lambda a: a[0], operands))))
-    return Velocities(*jax.lax.map(one, operands))
+    places = _together(_turned(targets, angles), model.rotor.blades)
+    v = _turned(_apart(_at_instants(model, segments, places, angles), len(targets)), -angles)
+    v = v + jax.vmap(lambda points, angle: undisturbed(model, points, angle))(targets, angles)
+    v = jnp.split(v, np.cumsum([part.shape[1] for part in nodes])[:-1], axis=1)
+    near, far = (part.reshape(a.shape) for part, a in zip(v[1:], (state.near, state.far), strict=True))
+    sharpened = jax.vmap(lambda *both: _sharpened(model, *both))(control, segments)
+    bent = jax.vmap(lambda k, slice_: self_induction(model.of_slice(k), slice_))(numbers, state)
+    return Velocities(v[0] + sharpened, near, far + bent)
 
 
 def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> Float[Array, "K N 3"]:
     """Induced velocity over ΩR at hub-frame points over R, at each of the state's azimuths; climb not included."""
-    segments = wake_segments(model, state)
-
-    def one(operand):
-        k, angle = operand
-        return rotate_about_shaft(_induced(model, segments, rotate_about_shaft(points, -angle), k, angle), angle)
-
-    return jax.lax.map(one, (jnp.arange(slices(state)), azimuths(state)))
+    instants = -(-slices(state) // model.rotor.blades)
+    places = jnp.broadcast_to(points, (instants, *points.shape))
+    found = _at_instants(model, wake_segments(model, state), places, azimuths(state))
+    return jnp.tile(found, (slices(state) // instants, 1, 1))
 
 
 def velocity_now(
     state: WakeState, psi: Float[Array, ""], points: Float[Array, "N 3"], model: FreeWake
 ) -> Float[Array, "N 3"]:
     """Induced velocity over ΩR at hub-frame points over R, at the one instant at which slice 0 stands at psi."""
-    turned = rotate_about_shaft(points, -psi)
-    return rotate_about_shaft(_induced(model, wake_segments(model, state, psi), turned, 0, psi), psi)
+    segments, angles = wake_segments(model, state, psi), azimuths(state, psi)
+    places = jnp.broadcast_to(points, (-(-slices(state) // model.rotor.blades), *points.shape))
+    return _at_instants(model, segments, places, angles)[0]
 
 
-def _at_slice(model, segments, targets, k, angle):
-    """Induced velocity, climb, wind and the auxiliary washout at points in the frame of slice k."""
-    return _induced(model, segments, targets, k, angle) + undisturbed(model, targets, angle)
+def _at_instants(
+    model: FreeWake, segments: Segments, places: Float[Array, "I N 3"], angles: Float[Array, " K"]
+) -> Float[Array, "I N 3"]:
+    """Velocity at points of the hub frame, N for each instant, from all blades' wakes and their images in the ground.
 
-
-def _induced(model: FreeWake, segments: Segments, targets: Float[Array, "N 3"], k, angle) -> Float[Array, "N 3"]:
-    """Velocity from all blades' wakes, and from their images in the ground, in the frame of slice k.
-
-    The image needs no states: its velocity is the reflected velocity of the real wake at the reflected point.
+    The ground is fixed in that frame. K = 1: every blade's wake is the same. Else slices i, i + I, i + 2I … are the
+    blades' wakes at instant i.
     """
-    blades = model.rotor.blades
-    count = segments.strength.shape[0]
-    # the plane is fixed in the hub frame, so the sum is made there
-    targets = rotate_about_shaft(targets, angle)
+    turned = segments._replace(start=_turned(segments.start, angles), end=_turned(segments.end, angles))
+    blades = model.rotor.blades if len(angles) == 1 else 1
+    of_instants = jax.tree.map(lambda a: _together(a, model.rotor.blades), turned)
+
+    def one(operand):
+        points, sources = operand
+        return segment_velocity(points, *sources, plane=model.ground, blades=blades)
+
+    if len(places) == 1:
+        return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
+    return jax.lax.map(one, (places, of_instants))
+
+
+def _turned(vectors: Float[Array, "K n 3"], angles: Float[Array, " K"]) -> Float[Array, "K n 3"]:
+    """Vectors of each slice turned by its angle; an axisymmetric wake (K = 1) is the same at all azimuths."""
+    return vectors if len(angles) == 1 else rotate_about_shaft(vectors, angles[:, None])
+
+
+def _together(a: Float[Array, "K n *rest"], blades: int) -> Float[Array, "I m *rest"]:
+    """What K slices hold, by instants: all blades' at one instant in a row; one slice stands for itself."""
+    count = len(a)
     if count == 1:
-        own = jax.tree.map(lambda a: a[0], segments)
-        turned = own._replace(start=rotate_about_shaft(own.start, angle), end=rotate_about_shaft(own.end, angle))
-        v = segment_velocity(targets, *turned, plane=model.ground, blades=blades)
-    else:
-        others = (k + count // blades * jnp.arange(blades)) % count
-        at = (angle + 2 * jnp.pi / blades * jnp.arange(blades))[:, None]
-        start, end, strength, core = (a[others] for a in segments)
-        start, end = rotate_about_shaft(start, at), rotate_about_shaft(end, at)
-        v = segment_velocity(
-            targets, start.reshape(-1, 3), end.reshape(-1, 3), strength.ravel(), core.ravel(), plane=model.ground
-        )
-    return rotate_about_shaft(v, -angle)
+        return a
+    by_blade = a.reshape(blades, count // blades, *a.shape[1:])
+    return jnp.swapaxes(by_blade, 0, 1).reshape(count // blades, -1, *a.shape[2:])
+
+
+def _apart(a: Float[Array, "I m 3"], count: int) -> Float[Array, "K n 3"]:
+    """The way back from `_together` to `count` slices."""
+    if count == 1:
+        return a
+    instants = len(a)
+    by_instant = a.reshape(instants, count // instants, -1, 3)
+    return jnp.swapaxes(by_instant, 0, 1).reshape(count, -1, 3)
 
 
 def carried(model: FreeWake, angle: Float[Array, ""]) -> Float[Array, "3"]:
     """What the wake is carried by besides itself, in the frame at `angle`: climb, wind, the solver's auxiliary flow."""
-    axial = jnp.zeros(3, model.climb.dtype).at[2].set(-model.climb - model.washout)
+    axial = -(model.climb + model.washout) * np.array([0.0, 0.0, 1.0])
     return axial if model.flight is None else axial + rotate_about_shaft(model.flight.wind, -angle)
 
 
@@ -119,16 +128,14 @@ def undisturbed(model: FreeWake, points: Float[Array, "N 3"], angle: Float[Array
     return carried(model, angle) - jnp.cross(rotate_about_shaft(model.flight.turn, -angle), points)
 
 
-def _sharpened(model: FreeWake, slice_: WakeState, points: Float[Array, "R 3"]) -> Float[Array, "R 3"]:
+def _sharpened(model: FreeWake, control: Float[Array, "R 3"], segments: Segments) -> Float[Array, "R 3"]:
     """What the blade's own near wake adds at its control points when its core is small there.
 
     The core that keeps the lattice smooth at its own nodes would smear the tip loss, where panels are narrower than
     it, and the circulation would end at the tip with a finite value.
     """
-    fine = near_lattice(model, slice_, model.settings.control_core)
-    smooth = near_lattice(model, slice_, model.settings.near_core)
-    both = join(fine, smooth._replace(strength=-smooth.strength))
-    return segment_velocity(points, *both)
+    lattice = jax.tree.map(lambda a: a[: lattice_segments(model)], segments)
+    return sharpened_velocity(control, *lattice, fine=model.settings.control_core)
 
 
 def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]:
@@ -139,8 +146,8 @@ def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]
     §10.3, with r_c the radius of greatest swirl), so the local part is Γκ/4π · (ln(2Δs/r_c) − 0.444) along the
     binormal. The inboard filaments stand for a sheet and have none.
     """
-    start: Release = releases(model, slice_)
-    tip = jnp.concatenate([start.points[:1], slice_.far[0], 2 * slice_.far[0, -1:] - slice_.far[0, -2:-1]])
+    released = releases(model, slice_).points[:1]
+    tip = jnp.concatenate([released, slice_.far[0], 2 * slice_.far[0, -1:] - slice_.far[0, -2:-1]])
     tangent = 0.5 * (tip[2:] - tip[:-2])
     bend = tip[2:] - 2 * tip[1:-1] + tip[:-2]
     step = jnp.sqrt(jnp.sum(tangent**2, axis=-1, keepdims=True))
@@ -148,4 +155,4 @@ def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]
     log = jnp.log(2 * step / model.settings.self_induction_core) - 0.444
     strength = faded(model, slice_.gamma_far, model.settings.filament_ages[1:])[0]
     own = strength[:, None] / (4 * jnp.pi) * log * binormal
-    return jnp.zeros_like(slice_.far).at[0].set(own)
+    return jnp.pad(own[None], [(0, len(slice_.far) - 1), (0, 0), (0, 0)])

@@ -93,11 +93,18 @@ def pairs(points: Vector, nodes: Array, soft: Array, *, slice_r: bool = False) -
     return Pairs(r1, r2, d[:count], d[-count:], i[:count], i[-count:], edge, soft[:, None])
 
 
+def loose_pairs(points: Vector, start: Vector, end: Vector, soft: Array) -> Pairs:
+    """Geometry of all pairs of N points and U segments that share no nodes."""
+    r1, r2 = subtract(points, columns(start)), subtract(points, columns(end))
+    (d1, i1), (d2, i2) = _distance(r1), _distance(r2)
+    return Pairs(r1, r2, d1, d2, i1, i2, columns(subtract(end, start)), soft[:, None])
+
+
 def _distance(r: Vector) -> tuple[Array, Array]:
     """|r| and 1/|r| (0 where r is 0)."""
     square = dot(r, r)
     d = jnp.sqrt(square)
-    return d, d / _nonzero(square)
+    return d, d / nonzero(square)
 
 
 def influence(pair: Pairs, exponent: float) -> Array:
@@ -112,8 +119,8 @@ def influence(pair: Pairs, exponent: float) -> Array:
     top = (pair.d1 + pair.d2) * jnp.where(outside, h, p - q)
     bottom = p * jnp.where(outside, p + q, 1)
     if exponent == 1:
-        return top / _nonzero(bottom * (h + pair.soft))
-    return top / _nonzero(bottom) * _core(h, pair.soft, exponent)[0]
+        return top / nonzero(bottom * (h + pair.soft))
+    return top / nonzero(bottom) * _core(h, pair.soft, exponent)[0]
 
 
 def slopes(pair: Pairs, exponent: float) -> Slopes:
@@ -126,8 +133,8 @@ def slopes(pair: Pairs, exponent: float) -> Slopes:
     top = (pair.d1 + pair.d2) * jnp.where(outside, h * (i1 * i2) ** 2, 1 - cos)
     bottom = jnp.where(outside, 1 + cos, 1)
     if exponent == 1:
-        k = k_h = k_e = top / _nonzero(bottom * (h + pair.soft))
-        spread = _nonzero(h + pair.soft)
+        k = k_h = k_e = top / nonzero(bottom * (h + pair.soft))
+        spread = nonzero(h + pair.soft)
     else:
         w, slope_h, slope_e = _core(h, pair.soft, exponent)
         m = top / bottom
@@ -142,13 +149,13 @@ def slopes(pair: Pairs, exponent: float) -> Slopes:
 
 def _core(h: Array, e: Array, n: float) -> tuple[Array, Array, Array]:
     """W, hⁿ⁻¹/(hⁿ + eⁿ) and eⁿ⁻¹/(hⁿ + eⁿ), scaled by the larger of h and e so that no power overflows."""
-    scale = 1 / _nonzero(jnp.maximum(h, e))
+    scale = 1 / nonzero(jnp.maximum(h, e))
     h, e = h * scale, e * scale
     total = h**n + e**n
     total = jnp.where(total > 0, total, 1)
     return scale * total ** (-1 / n), scale * h ** (n - 1) / total, scale * e ** (n - 1) / total
 
 
-def _nonzero(x: Array) -> Array:
+def nonzero(x: Array) -> Array:
     """1 in place of 0: the numerator (or what multiplies the quotient) vanishes there too."""
     return jnp.where(x > 0, x, 1)

@@ -50,8 +50,8 @@ class BiotSavart(VJPHiPrimitive):
         return velocity_and_tangent(self.settings, *residuals, *_dense(tangents))[1]
 
     def batch_dim_rule(self, axis_data, in_dims):
-        """Put the batch axis of the result first."""
-        return 0
+        """Put the batch axis of the result first, where there is one."""
+        return None if all(dim is None for dim in jax.tree.leaves(in_dims, is_leaf=lambda d: d is None)) else 0
 
 
 def _dense(tree):

@@ -144,7 +144,8 @@ def _blocks(segments: Segments, settings: Settings) -> Block:
     missing = steps * width - segments.strength.shape[0]
 
     def cut(row: Array, filler: Array) -> Array:
-        full = jnp.concatenate([row, jnp.repeat(filler, missing, axis=-1)], axis=-1)
+        filling = jnp.broadcast_to(filler, (*row.shape[:-1], missing))
+        full = jnp.concatenate([row, filling], axis=-1)
         return jnp.moveaxis(full.reshape(*row.shape[:-1], steps, width), -2, 0)
 
     last = segments.end[:, -1:]

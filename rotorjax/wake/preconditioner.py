@@ -33,22 +33,31 @@ class HarmonicInverse(eqx.Module):
         return jax.vmap(back)(jnp.fft.irfft(solved, slices, axis=0))
 
 
-def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int) -> HarmonicInverse:
-    """Make the preconditioner for K slices from an axisymmetric wake (K = 1) over level ground or none."""
+def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int, found: Evaluation | None = None) -> HarmonicInverse:
+    """Make the preconditioner for K slices from an axisymmetric wake (K = 1) over level ground or none.
+
+    found: the wake's evaluation, where it is at hand.
+    """
     blades = model.rotor.blades
-    found = evaluated(model, x)
+    found = evaluated(model, x) if found is None else found
     # the derivative is real, so that of −q is the conjugate of that of q
     waves = [p % blades for p in range(slices // 2 + 1)]
     half = {
-        q: velocity_response(model, found.state, jnp.asarray(2 * np.pi * q / blades))
+        q: velocity_response(model, found.state, np.asarray(2 * np.pi * q / blades))
         for q in sorted({min(p, blades - p) for p in waves})
     }
-    responses = jnp.stack([half[p] if p in half else jnp.conj(half[blades - p]) for p in waves])
-    matrix = _jacobian(model, x, found, responses, slices)
-    return HarmonicInverse(jnp.linalg.inv(matrix))
+    return _inverse(model, x, found, [half[min(p, blades - p)] for p in waves], [p in half for p in waves], slices)
 
 
 @eqx.filter_jit
+def _inverse(
+    model: FreeWake, x: Unknowns, found: Evaluation, responses: list[Array], direct: list[bool], slices: int
+) -> HarmonicInverse:
+    """Invert J_p for harmonics that answer with `responses`, or with their conjugates where not `direct`."""
+    whole = jnp.stack([r if d else jnp.conj(r) for r, d in zip(responses, direct, strict=True)])
+    return HarmonicInverse(jnp.linalg.inv(_jacobian(model, x, found, whole, slices)))
+
+
 def _jacobian(model: FreeWake, x: Unknowns, found: Evaluation, responses: Complex[Array, "P N 3 m"], slices: int):
     """J_p [P, n, n]: a unit disturbance of each unknown of slice 0, followed through one pass."""
     one, unravel = ravel_pytree(_first(x))

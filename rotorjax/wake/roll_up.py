@@ -22,7 +22,7 @@ The tip vortex starts at the mean place of a short stretch of the last row, `rel
 of that row will not do: its edge has begun to roll up, and the point moves on with every panel that resolves it.
 """
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -61,44 +61,60 @@ def tip_share(model: FreeWake, gamma: Float[Array, " R"]) -> Float[Array, " R+1"
 def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array, " R"]) -> Release:
     """Start points and strengths of the far filaments from the last row of the near wake and its ring strengths."""
     settings, inboard = model.settings, model.settings.inboard
+    points = _along(last_row, _risen(model))
     if settings.roll_up == "impulse":
-        stations = jnp.stack([*(jnp.asarray(r) for r in inboard), settings.release])
-        strength = _weights(model.edges**2, stations**2, "extrapolate") @ trailers(gamma)
-        points = jnp.stack([*(at_span(model, last_row, r) for r in stations[:-1]), tip_point(model, last_row)])
-        return Release(jnp.roll(points, 1, axis=0), jnp.roll(strength, 1))
+        stations = jnp.stack([*map(jnp.asarray, inboard), settings.release])
+        return Release(points, trailers(gamma) @ _weights(model.edges**2, stations**2, beyond=True, first=-1))
     gathered = tip_share(model, gamma) * trailers(gamma)
     strength = jnp.sum(gathered)
-    if model.settings.roll_up == "paper":
-        point = last_row[-1]
-    elif model.settings.roll_up == "centroid":
+    if settings.roll_up == "paper":
+        points = points.at[0].set(last_row[-1])
+    elif settings.roll_up == "centroid":
         # Γ_tip > 0 wherever the blade lifts; the floor keeps an unloaded blade finite
-        point = (gathered @ last_row) / jnp.sqrt(strength**2 + 1e-16)
-    else:
-        point = tip_point(model, last_row)
+        points = points.at[0].set((gathered @ last_row) / jnp.sqrt(strength**2 + 1e-16))
     if not inboard:
-        return Release(point[None], strength[None])
-    rest = _weights(model.edges, jnp.asarray(inboard)) @ (trailers(gamma) - gathered)
-    points = jnp.stack([at_span(model, last_row, jnp.asarray(r)) for r in inboard])
-    return Release(jnp.concatenate([point[None], points]), jnp.concatenate([strength[None], rest]))
+        return Release(points, strength[None])
+    rest = (trailers(gamma) - gathered) @ _weights(model.edges, jnp.asarray(inboard))
+    return Release(points, jnp.concatenate([strength[None], rest]))
 
 
 def tip_point(model: FreeWake, row: Float[Array, "R+1 3"]) -> Float[Array, "3"]:
     """Mean of a row of nodes over the span stations `release` ± `release_band`: where the rows roll up to."""
+    return _along(row, _risen(model))[0]
+
+
+def _risen(model: FreeWake) -> Float[Array, "F R"]:
+    """How far along each panel the filaments start, 0 to 1: the tip vortex (a mean), then the others."""
+    settings = model.settings
     across = (np.arange(SAMPLES) + 0.5) / SAMPLES * 2 - 1
-    places = jax.vmap(lambda r: at_span(model, row, r))
-    return jnp.mean(places(model.settings.release + model.settings.release_band * across), axis=0)
+    centres = jnp.stack([settings.release, *map(jnp.asarray, settings.inboard)])
+    bands = settings.release_band * np.eye(settings.filaments)[0]
+    return jnp.mean(ramps(centres[:, None] + bands[:, None] * across, model.edges), axis=1)
 
 
-def at_span(model: FreeWake, row: Float[Array, "R+1 3"], r: Float[Array, ""]) -> Float[Array, "3"]:
-    """Point of a row of nodes at span station r (over R), linear between trailers."""
-    return jnp.stack([jnp.interp(r, model.edges, row[:, i]) for i in range(3)])
+def _along(row: Float[Array, "R+1 3"], risen: Float[Array, "F R"]) -> Float[Array, "F 3"]:
+    """Points on the straight lines through a row of nodes."""
+    return row[0] + risen @ jnp.diff(row, axis=0)
 
 
 def _weights(
-    x: Float[Array, " N"], nodes: Float[Array, " G"], beyond: Literal["extrapolate"] | None = None
-) -> Float[Array, "G N"]:
+    x: Float[Array, " N"], nodes: Float[Array, " G"], beyond: bool = False, first: int = 0
+) -> Float[Array, "N G"]:
     """Linear weights that hand each x to its neighbouring nodes; they sum to one over the nodes.
 
-    Beyond the ends all goes to the last node, or with "extrapolate" to the last two so that Σ weights · nodes is x.
+    What lies outside all goes to the last node, or with `beyond` to the last two so that Σ weights · nodes is x.
+    first: the node that comes first.
     """
-    return jnp.stack([jnp.interp(x, nodes, unit, left=beyond, right=beyond) for unit in jnp.eye(len(nodes))])
+    unit = np.roll(np.eye(nodes.shape[0]), -first, axis=1)
+    return unit[0] + ramps(x, nodes, beyond) @ np.diff(unit, axis=0)
+
+
+def ramps(x: Float[Array, "*n"], nodes: Float[Array, " G"], beyond: bool = False) -> Float[Array, "*n G-1"]:
+    """How far each x has come along each interval between rising nodes: 0 before it, 1 behind it.
+
+    beyond: the first and the last interval go on outside.
+    """
+    low, high = np.zeros(nodes.shape[0] - 1), np.ones(nodes.shape[0] - 1)
+    if beyond:
+        low[:1], high[-1:] = -np.inf, np.inf
+    return jnp.clip((x[..., None] - nodes[:-1]) / jnp.diff(nodes), low, high)

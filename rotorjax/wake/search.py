@@ -1,7 +1,7 @@
 """The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import equinox as eqx
 import jax
@@ -11,10 +11,9 @@ import numpy as np
 from rotorjax.ground import Plane
 from rotorjax.ode.anderson import anderson
 from rotorjax.ode.continuation import Branch, continuation
-from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
-from rotorjax.wake.equilibrium import Unknowns, residual
+from rotorjax.wake.equilibrium import METHOD, Unknowns, look, told
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.start import laid_level, prescribed, with_the_ground
@@ -47,7 +46,7 @@ class Search:
         """Wake of a model without ground, by way of the auxiliary flow."""
         washed = with_washout(model, WASHOUT)
         guess = prescribed(model, WASHOUT + 0.03)
-        first = anderson(residual, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80, difference=True)
+        first = anderson(told, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80, linear=METHOD)
         self.note("prescribed wake", first)
         if not np.isfinite(first.residual):
             self.ok, self.why = False, f"the prescribed wake diverged: {first.why}"
@@ -56,17 +55,17 @@ class Search:
 
     def move(self, here: FreeWake, there: FreeWake, x: Unknowns, stage: str) -> tuple[FreeWake, Unknowns]:
         """Follow the branch from one model to another of the same structure."""
-        same = all(bool(jnp.all(a == b)) for a, b in zip(_leaves(here), _leaves(there), strict=True))
-        if same:
+        here, there = on_host(here), on_host(there)
+        if all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(here), jax.tree.leaves(there), strict=True)):
             return self.settle(there, x)
 
         def between(s):
-            model = jax.tree.map(lambda a, b: a + s * (b - a) if eqx.is_inexact_array(a) else b, here, there)
+            model = on_host(jax.tree.map(lambda a, b: a + s * (b - a) if eqx.is_inexact_array(a) else b, here, there))
             if here.ground is None or there.ground is None:
                 return model
             # even steps in 1/h: the ground's effect goes with it
             height = 1 / ((1 - s) / here.ground.height + s / there.ground.height)
-            return eqx.tree_at(lambda m: m.ground.height, model, height)
+            return eqx.tree_at(lambda m: m.ground.height, model, np.asarray(height))
 
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
         first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
@@ -107,14 +106,15 @@ class Search:
 
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
-        linear = Krylov(forcing=0.03, precondition=self.inverse, restart=effort, restarts=1)
-        return newton(residual, x, model, linear=linear, tol=tol, max_iterations=16 if effort > 1 else 1)
+        linear = replace(METHOD, precondition=self.inverse, restart=effort)
+        return newton(told, x, model, linear=linear, tol=tol, max_iterations=16 if effort > 1 else 1)
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
         if x.near.shape[0] > 1 and model.ground is not None:
-            level = eqx.tree_at(lambda m: m.ground.slope, model, jnp.zeros_like(model.ground.slope))
-            self.inverse = harmonic_inverse(level, laid_level(x, model.ground), x.near.shape[0])
+            level = eqx.tree_at(lambda m: m.ground.slope, model, np.zeros_like(model.ground.slope))
+            laid = laid_level(x, model.ground)
+            self.inverse = harmonic_inverse(level, laid, x.near.shape[0], look(level, laid)[1])
 
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""
@@ -128,18 +128,16 @@ def over_distant_ground(model: FreeWake) -> FreeWake:
     """The model over level ground so far down that the wake out of ground effect is a good guess."""
     ground = model.ground
     assert ground is not None
-    level = Plane(jnp.maximum(3.0, 1.5 * ground.height), jnp.zeros_like(ground.slope))
-    return eqx.tree_at(lambda m: m.ground, model, level)
+    level = Plane(np.maximum(3.0, 1.5 * np.asarray(ground.height)), np.zeros_like(ground.slope))
+    return on_host(eqx.tree_at(lambda m: m.ground, model, level))
 
 
 def with_washout(model: FreeWake, washout: float) -> FreeWake:
     """The model in an auxiliary flow, its collective raised by the flow's angle at 0.75 R so that the loading stays."""
-    return eqx.tree_at(
-        lambda m: (m.washout, m.operating.collective),
-        model,
-        (jnp.asarray(washout, float), model.operating.collective + washout / 0.75),
-    )
+    numbers = washout, np.asarray(model.operating.collective) + washout / 0.75
+    return on_host(eqx.tree_at(lambda m: (m.washout, m.operating.collective), model, numbers))
 
 
-def _leaves(model: FreeWake) -> list:
-    return jax.tree.leaves(eqx.filter(model, eqx.is_inexact_array))
+def on_host(model: FreeWake) -> FreeWake:
+    """The model with its numbers as numpy's, which need no program to reckon with."""
+    return jax.tree.map(lambda a: np.asarray(a, jnp.result_type(a)), model)

@@ -38,6 +38,12 @@ def near_lattice(model: FreeWake, state: WakeState, core: Float[Array, ""]) -> S
     return join(trailed, shed)
 
 
+def lattice_segments(model: FreeWake) -> int:
+    """How many segments a near lattice has, the first of a slice's."""
+    panels, ages = model.settings.panels, model.settings.near_ages
+    return (panels + 1) * ages + panels * (ages - 1)
+
+
 def lattice_nodes(model: FreeWake, near: Float[Array, "R+1 AN 3"]) -> Float[Array, "R+1 A 3"]:
     """All nodes of a slice's lattice, the lifting line first."""
     return jnp.concatenate([model.leading[:, None], near], axis=1)

@@ -94,7 +94,8 @@ def _stays_level(model: FreeWake) -> bool:
 
 def _found(model: FreeWake, start: Solution | None, progress: Progress | None, tol: float, slices: int) -> Unknowns:
     """The unknowns of a converged search, of K slices. Raises InputError where it does not converge."""
-    found = on_host.solve(jax.tree.map(jnp.asarray, model), start, progress, tol)
+    with jax.ensure_compile_time_eval():  # numbers all the way, whatever traces are open around this
+        found = on_host.solve(jax.tree.map(jnp.asarray, model), start, progress, tol)
     if not found.converged:
         raise InputError(
             f"Argument `model` must have a periodic wake that is found, to be traced, but the search ended: {found.why}"

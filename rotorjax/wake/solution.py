@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading
 from rotorjax.wake.clock import Clock
-from rotorjax.wake.equilibrium import Evaluation, Unknowns, advance, displacement, evaluated, spread
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, look, spread
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
@@ -79,11 +79,7 @@ class Solution:
         plane = self.model.ground
         if plane is None:
             return None
-        r, psi = np.meshgrid(np.linspace(0.1, 2.0, 12), np.linspace(0, 2 * np.pi, 16, endpoint=False))
-        flat = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
-        points = flat - plane.distance(flat)[:, None] * plane.normal
-        through = _velocity(self.state, points, self.model) @ plane.normal
-        return float(jnp.sqrt(jnp.mean(through**2)) / np.sqrt(abs(self.CT) / 2))
+        return float(_through_the_ground(self.state, self.model)) / float(np.sqrt(abs(self.CT) / 2))
 
 
 ARRAYS = ("r", "widths", "psi", "dct_dr", "inflow", "circulation", "tip_vortex")
@@ -123,15 +119,15 @@ def solve(
     if search.ok:
         slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
         if x.near.shape[0] > slices:
-            x = jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), x)
-        here, x = search.move(here, model, spread(x, slices), "to the case")
+            x = jax.tree.map(lambda a: np.mean(a, axis=0, keepdims=True), x)
+        here, x = search.move(here, model, _spread(x, slices), "to the case")
     return read(here, x, search, clock)
 
 
 def rehearse(model: FreeWake) -> Solution:
     """Compile what `solve` runs on a case of this kind, on a prescribed wake that solves nothing and is returned."""
     slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
-    x = spread(prescribed(model), slices)
+    x = _spread(prescribed(model), slices)
     search = Search(tol=0.0, progress=None, ok=False, why="a rehearsal")
     search.prepare(model, x)
     search.newton(model, x, 0.0, effort=1)
@@ -148,9 +144,10 @@ def _fits(start: Solution, model: FreeWake) -> bool:
 
 def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
     """Evaluate the wake that a search ended with, and collect what a user wants of it, as numbers."""
-    found = readings(model, x)
-    moved = _advanced(model, x)
-    then = _performance(model, evaluated(model, moved))
+    change, evaluation = look(model, x)
+    moved = jax.tree.map(lambda a, b: np.asarray(a) + np.asarray(b), x, change)
+    then = _read_off(model, look(model, moved)[1])["CT"]
+    found = readings(model, x, evaluation)
     numbers: dict[str, Any] = {n: np.asarray(getattr(found, n)) for n in ARRAYS} | {
         n: float(getattr(found, n)) for n in NUMBERS
     }
@@ -160,8 +157,8 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
         **numbers,
         converged=search.ok,
         why=search.why,
-        residual=displacement(jax.tree.map(np.subtract, moved, x)),
-        load_change=abs(float(then.thrust) / numbers["CT"] - 1),
+        residual=displacement(change),
+        load_change=abs(float(then) / numbers["CT"] - 1),
         iterations=search.iterations,
         residuals=tuple(search.residuals),
         wall_time_s=wall,
@@ -169,11 +166,13 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
     )
 
 
-def readings(model: FreeWake, x: Unknowns) -> Solution:
-    """What can be read off a converged periodic wake, as functions of model and wake: for jax to differentiate."""
-    found = evaluated(model, x)
-    now = _performance(model, found)
-    along: dict[str, Any] = _distributions(model, found)
+def readings(model: FreeWake, x: Unknowns, found: Evaluation | None = None) -> Solution:
+    """What can be read off a converged periodic wake, as functions of model and wake: for jax to differentiate.
+
+    found: the wake's evaluation, where it is at hand.
+    """
+    found = evaluated(model, x) if found is None else found
+    read: dict[str, Any] = _read_off(model, found)
     return Solution(
         model=model,
         state=found.state,
@@ -185,19 +184,14 @@ def readings(model: FreeWake, x: Unknowns) -> Solution:
         wall_time_s=0.0,
         compile_time_s=0.0,
         tip_vortex_age=model.settings.filament_ages,
-        CT=now.thrust,
-        CP=now.power,
-        CP_induced=now.induced,
-        CP_profile=now.profile,
-        mean_inflow=now.mean_inflow,
-        **along,
+        **read,
     )
 
 
 @eqx.filter_jit
-def _distributions(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
-    """Fields of a solution along blades and vortices."""
-    psi = azimuths(found.state)
+def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
+    """Fields of a solution: along blades and vortices, and of the whole rotor."""
+    psi, now = azimuths(found.state), performance(model, found)
     tip = jnp.concatenate([found.start.points[:, :1], found.state.far[:, 0]], axis=1)
     return {
         "r": model.stations,
@@ -207,9 +201,23 @@ def _distributions(model: FreeWake, found: Evaluation) -> dict[str, Float[Array,
         "inflow": -found.velocities.control[..., 2],
         "circulation": found.loads.circulation,
         "tip_vortex": rotate_about_shaft(tip, psi[:, None]),
+        "CT": now.thrust,
+        "CP": now.power,
+        "CP_induced": now.induced,
+        "CP_profile": now.profile,
+        "mean_inflow": now.mean_inflow,
     }
 
 
-_performance = eqx.filter_jit(performance)
-_advanced = eqx.filter_jit(advance)
-_velocity = eqx.filter_jit(velocity)
+@eqx.filter_jit
+def _through_the_ground(state: WakeState, model: FreeWake) -> Float[Array, ""]:
+    """Rms velocity through the plane within 2 R of the shaft."""
+    plane = model.ground
+    assert plane is not None
+    r, psi = np.meshgrid(np.linspace(0.1, 2.0, 12), np.linspace(0, 2 * np.pi, 16, endpoint=False))
+    flat = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
+    points = flat - plane.distance(flat)[:, None] * plane.normal
+    return jnp.sqrt(jnp.mean((velocity(state, points, model) @ plane.normal) ** 2))
+
+
+_spread = eqx.filter_jit(spread)

@@ -1,7 +1,9 @@
 """Guesses of the wake: a prescribed one (after Landgrebe 1972), and a solved one moved to another ground."""
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
@@ -14,31 +16,30 @@ def prescribed(model: FreeWake, inflow: float = 0.055) -> Unknowns:
 
     Over ground it slows towards the plane and spreads so that the flow through it is conserved.
     """
+    return _prescribed(model, jnp.asarray(inflow, float))
+
+
+@eqx.filter_jit
+def _prescribed(model: FreeWake, inflow: Float[Array, ""]) -> Unknowns:
     settings = model.settings
     step = settings.age_step
-    edges, stations = np.asarray(model.edges), np.asarray(model.stations)
     near_age = step * np.arange(1, settings.near_ages + 1)
     narrowing = 0.8 + 0.2 * np.exp(-0.3 * near_age)
-    near = np.stack(
-        [
-            np.outer(edges, narrowing * np.cos(near_age)),
-            -np.outer(edges, narrowing * np.sin(near_age)),
-            np.tile(-0.5 * inflow * near_age, (len(edges), 1)),
-        ],
-        axis=-1,
-    )
+    x, y = (jnp.outer(model.edges, narrowing * part) for part in (np.cos(near_age), -np.sin(near_age)))
+    near = jnp.stack([x, y, jnp.broadcast_to(-0.5 * inflow * near_age, x.shape)], axis=-1)
     age = settings.filament_ages[1:]
     passage = 2 * np.pi / model.rotor.blades
     depth = inflow * np.where(age < passage, 0.4 * age, 0.4 * passage + (age - passage))
     radius = 0.78 + 0.22 * np.exp(-0.3 * age)
     if model.ground is not None:
-        height = float(model.ground.height)
-        radius = radius * np.exp(0.5 * np.clip(inflow / height * age - 1, 0, None))
-        depth = height * (1 - np.exp(-inflow / height * age))
-    spans = [1.0, *(min(r, 0.85) for r in settings.inboard)]
-    far = np.stack([np.stack([s * radius * np.cos(age), -s * radius * np.sin(age), -depth], axis=-1) for s in spans])
-    gamma = 0.36 * model.chords * np.sqrt(np.clip(1 - ((stations - 0.65) / 0.37) ** 2, 0, 1))
-    return Unknowns(*(jnp.asarray(a, float)[None] for a in (near, far, gamma)))
+        height = model.ground.height
+        radius = radius * jnp.exp(0.5 * jnp.clip(inflow / height * age - 1, 0, None))
+        depth = height * (1 - jnp.exp(-inflow / height * age))
+    spans = np.minimum([1.0, *settings.inboard], [1.0, *(0.85 for _ in settings.inboard)])
+    x, y = (jnp.outer(spans, radius * part) for part in (np.cos(age), -np.sin(age)))
+    far = jnp.stack([x, y, jnp.broadcast_to(-depth, x.shape)], axis=-1)
+    gamma = 0.36 * model.chords * jnp.sqrt(jnp.clip(1 - ((model.stations - 0.65) / 0.37) ** 2, 0, 1))
+    return Unknowns(near[None], far[None], gamma[None])
 
 
 def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> Unknowns:
@@ -48,6 +49,11 @@ def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> U
     """
     if before is None or after is None:
         return x
+    return _with_the_ground(x, before, after)
+
+
+@eqx.filter_jit
+def _with_the_ground(x: Unknowns, before: Plane, after: Plane) -> Unknowns:
     at = 2 * jnp.pi / x.near.shape[0] * jnp.arange(x.near.shape[0])[:, None, None]
     tilt = after.slope - before.slope
     down = jnp.array([0.0, 0.0, 1.0])
@@ -72,6 +78,7 @@ def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> U
     return x._replace(near=move(x.near), far=move(x.far))
 
 
+@eqx.filter_jit
 def laid_level(x: Unknowns, ground: Plane) -> Unknowns:
     """Axisymmetric wake (K = 1) like that of a slope: its nodes sheared down or up to level ground, then averaged.
 

@@ -35,6 +35,14 @@ def harmonics(slices: int) -> Float[np.ndarray, " K"]:
     return numbers
 
 
+def _solved(operator: AgeOperator, turn: int, source: Array) -> Array:
+    """Solve ∂g/∂ψ + i turn g + matrix g = source for g periodic over the slices, both (K, F, A)."""
+    inverse = _inverse(operator, source.shape[0], turn)
+    if source.shape[0] == 1:  # the same at all azimuths
+        return source @ (inverse[0] if turn else inverse[0].real).T
+    return jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", inverse, jnp.fft.fft(source, axis=0)), axis=0)
+
+
 def _inverse(operator: AgeOperator, slices: int, turn: int) -> Complex[np.ndarray, "K A A"]:
     unit = np.eye(len(operator.inlet))
     return np.stack([np.linalg.inv(operator.matrix + 1j * (p + turn) * unit) for p in harmonics(slices)])
@@ -42,9 +50,7 @@ def _inverse(operator: AgeOperator, slices: int, turn: int) -> Complex[np.ndarra
 
 def solve_scalar(operator: AgeOperator, f: Float[Array, "K F A"], inlet: Float[Array, "K F"]) -> Float[Array, "K F A"]:
     """Solve ∂g/∂ψ + ∂g/∂ζ = f for g periodic over the slices, with g = inlet at age 0."""
-    inverse = jnp.asarray(_inverse(operator, f.shape[0], 0))
-    source = jnp.fft.fft(f - operator.inlet * inlet[..., None], axis=0)
-    return jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", inverse, source), axis=0).real
+    return _solved(operator, 0, f - operator.inlet * inlet[..., None]).real
 
 
 def solve_nodes(
@@ -52,15 +58,14 @@ def solve_nodes(
 ) -> Float[Array, "K F A 3"]:
     """Solve ∂ρ/∂ψ + ẑ × ρ + ∂ρ/∂ζ = V for node positions in the blades' frames, ρ = inlet at age 0."""
     source = velocity - operator.inlet[:, None] * inlet[:, :, None]
-    turned = jnp.asarray(_inverse(operator, velocity.shape[0], 1))
-    plane = jnp.fft.fft(source[..., 0] + 1j * source[..., 1], axis=0)
-    plane = jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", turned, plane), axis=0)
-    straight = jnp.asarray(_inverse(operator, velocity.shape[0], 0))
-    axial = jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", straight, jnp.fft.fft(source[..., 2], axis=0)), axis=0)
+    plane = _solved(operator, 1, source[..., 0] + 1j * source[..., 1])
+    axial = _solved(operator, 0, source[..., 2])
     return jnp.stack([plane.real, plane.imag, axial.real], axis=-1)
 
 
 def lag(gamma: Float[Array, "K R"], time_constant: Float[Array, ""]) -> Float[Array, "K R"]:
     """Periodic solution of ∂Γ_b/∂ψ = (Γ − Γ_b)/time_constant."""
+    if gamma.shape[0] == 1:
+        return gamma
     p = jnp.asarray(harmonics(gamma.shape[0]))[:, None]
     return jnp.fft.ifft(jnp.fft.fft(gamma, axis=0) / (1 + 1j * p * time_constant), axis=0).real

@@ -4,6 +4,7 @@ import pytest
 
 from rotorjax.errors import InputError
 from rotorjax.ode.anderson import anderson
+from rotorjax.ode.linear import Dense, Krylov
 
 RNG = np.random.default_rng(1)
 SPREAD = jnp.array(np.diag(np.linspace(-3, 0.9, 40)) + 0.05 * RNG.normal(size=(40, 40)))
@@ -95,13 +96,14 @@ def test_bad_start():
         anderson(lambda x: x[:1], jnp.zeros(2))
 
 
-def test_the_difference_itself_gives_the_same_iterates():
+@pytest.mark.parametrize("linear", [Dense(), Krylov()])
+def test_a_residual_for_newton_gives_the_same_iterates(linear):
     b = jnp.linspace(-1, 1, 40)
 
     def difference(x, *args):
         return {"x": affine(x, *args)["x"] - x["x"]}
 
     one = anderson(affine, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10)
-    other = anderson(difference, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10, difference=True)
+    other = anderson(difference, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10, linear=linear)
     assert one.converged
     np.testing.assert_allclose(one.residuals, other.residuals, rtol=1e-6, atol=1e-12)

@@ -5,6 +5,7 @@ import json
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
@@ -13,9 +14,10 @@ from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 from rotorjax.simulation.case import COLUMNS, read_case, steps_of
 from rotorjax.simulation.history import piecewise, smooth
+from rotorjax.simulation.output import over_a_turn
 from rotorjax.simulation.run import driver_of
 from rotorjax.simulation.start import from_trim
-from rotorjax.trim.run import Result, prepare
+from rotorjax.trim.run import prepare
 from rotorjax.trim.solve import Trimmed, guess
 
 FLIGHT = '[flight]\nrotor = "uh60"\ninflow = "pitt-peters"\nthrust_coefficient = 0.00575\n'
@@ -54,6 +56,34 @@ def test_the_step_overshoots_as_the_inflow_builds_up(flown):
     assert float(data["flap"].sel(coordinate="0")[-1]) > float(data["flap"].sel(coordinate="0")[0])
 
 
+def test_the_last_instant_is_the_one_asked_for(flown):
+    _, data = flown
+    assert float(data["time"][-1]) == pytest.approx(0.5, rel=1e-12)
+    assert float(data["time"][-2]) < 0.5
+    omega = 27.0
+    np.testing.assert_allclose(data["azimuth"], omega * data["time"], rtol=1e-9)
+    assert np.diff(data["CT"])[-1] == pytest.approx(np.diff(data["CT"])[-2], rel=0.5)  # the last steps fit the rest
+
+
+def test_the_mean_thrust_waits_for_the_input_and_ends_above_it(flown):
+    _, data = flown
+    assert float(data["trim_CT"]) == pytest.approx(0.00575, rel=1e-8)
+    turned, t = over_a_turn(data, "CT"), data["time"].values
+    np.testing.assert_allclose(turned[t <= 0.25], 0.00575, rtol=1e-8)  # nothing before the input
+    turn = 2 * np.pi / 27.0
+    late = t > 0.5 - turn
+    inside = np.concatenate([[np.interp(0.5 - turn, t, data["CT"])], data["CT"].values[late]])
+    exact = np.trapezoid(inside, np.concatenate([[0.5 - turn], t[late]])) / turn
+    assert turned[-1] == pytest.approx(exact, rel=1e-3)
+
+
+def test_the_mean_over_a_turn_takes_vibration_away():
+    psi = np.append(2 * np.pi / 12 * np.arange(40), 20.7)
+    data = xr.Dataset({"azimuth": ("time", psi), "CT": ("time", 3 + 0.5 * np.cos(4 * psi)), "trim_CT": ((), 3.0)})
+    np.testing.assert_allclose(over_a_turn(data, "CT")[:-1][psi[:-1] >= 2 * np.pi], 3.0, atol=1e-12)
+    np.testing.assert_allclose(over_a_turn(data, "CT"), 3.0, atol=0.025)  # while it comes in, and over the last steps
+
+
 def test_the_files(flown):
     folder, data = flown
     told = json.loads((folder / "report.json").read_text())
@@ -76,7 +106,7 @@ def test_histories_are_scipys_monotone_cubics_with_their_rates():
 def started(case):
     """A trim that was not solved for: enough for its inputs."""
     p, flight, residual = prepare(case.request)
-    return from_trim(Result(case.request, p, flight, Trimmed(guess(p, flight), None, residual), 0.0))
+    return from_trim(Trimmed(guess(p, flight), None, residual, flight, p))
 
 
 def test_inputs_of_a_descent(tmp_path):

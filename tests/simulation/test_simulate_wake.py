@@ -29,7 +29,6 @@ from rotorjax.simulation.wake_output import KINDS
 from rotorjax.simulation.wake_pictures import wake_film
 from rotorjax.trim.free_wake import first_guess
 from rotorjax.trim.in_wake import TrimmedInWake, wake_trim
-from rotorjax.trim.in_wake_run import WakeResult
 
 FLIGHT = '[flight]\nrotor = "uh60"\ninflow = "freewake"\nthrust_coefficient = 0.0058\nadvance_ratio = 0.15\n'
 OVER_GROUND = FLIGHT + "height = 1.0\n"
@@ -57,7 +56,7 @@ def start(case):
     settings = settings_of(case)
     p = wake_trim(*catalogue.load("uh60"), rotor_inputs(u=0.15), 0.0058, plane(1.0), settings)
     z = first_guess(p, jnp.array([0.27, 0.04, -0.04]), 0.06, settings.azimuths, 0.03)
-    return from_wake(WakeResult(case.request, TrimmedInWake(z, p, None, 0), 0.0, 0.0))
+    return from_wake(TrimmedInWake(z, p, None, 0))
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +108,7 @@ def test_the_files(folder, flown):
     assert float(data["lag"].sel(coordinate="0")[-1]) > 0.2
     first = data["wake_lattice"].isel(frame=0, blade=0, near_age=0).values
     assert np.hypot(first[-1, 0] - 0.0466, first[-1, 2]) == pytest.approx(1 - 0.0466, abs=1e-4)
-    wake_film(data.isel(frame=slice(0, 2)), over_a_turn(data["CT"].values), folder / "animation.gif")
+    wake_film(data.isel(frame=slice(0, 2)), over_a_turn(data, "CT"), folder / "animation.gif")
     for name in ("histories.png", "wake.png", "animation.gif"):
         assert (folder / name).stat().st_size > 10_000
 

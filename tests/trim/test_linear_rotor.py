@@ -9,19 +9,19 @@ from rotorjax.errors import InputError
 from rotorjax.ode.harmonic import average
 from rotorjax.rotor.flap_lag import flap_frequency, lag_frequency
 from rotorjax.trim.linear import linear_model
-from rotorjax.trim.run import Request, run
+from rotorjax.trim.run import request, run
 
 INPUTS = ("theta_0", "theta_1s", "w", "q")
 
 
 @pytest.fixture(scope="module")
 def hover():
-    return run(Request("uh60", 0.00575, "pitt-peters"))
+    return run(request("uh60", 0.00575, "pitt-peters")).trimmed
 
 
 @pytest.fixture(scope="module")
 def periodic(hover):
-    return linear_model(hover.trimmed, hover.flight, hover.p, INPUTS, nodes=4)
+    return linear_model(hover, INPUTS, nodes=4)
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,6 @@ def test_static_gains(linear):
 
 
 def test_a_trim_that_failed_is_refused(hover):
-    failed = replace(hover.trimmed, outcome=replace(hover.trimmed.outcome, converged=False))
+    failed = replace(hover, outcome=replace(hover.outcome, converged=False))
     with pytest.raises(InputError, match="converged"):
         linear_model(failed, hover.flight, hover.p)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rotorjax.trim.run import Request, run
+from rotorjax.trim.run import request, run
 from rotorjax.trim.solve import power, trim, trimmed_power
 
 STEP = 1e-4
@@ -15,8 +15,8 @@ STEP = 1e-4
 @pytest.mark.slow
 def test_derivatives_of_trimmed_power_by_height_twist_and_chord():
     """With the uniform inflow over ground; height in R, twist and chord by shares of themselves."""
-    found = run(Request("uh60", 0.00575, "uniform", height=0.75, azimuths=8))
-    assert found.trimmed.outcome.converged
+    found = run(request("uh60", 0.00575, "uniform", height=0.75, azimuths=8)).trimmed
+    assert found.outcome.converged
 
     def moved(v):
         rotor = found.p.rotor
@@ -32,6 +32,6 @@ def test_derivatives_of_trimmed_power_by_height_twist_and_chord():
         return power(trim(p, flight, start=found.z, azimuths=8).z, flight, p)
 
     for way in jnp.eye(3):
-        _, slope = jax.jvp(lambda v: trimmed_power(found.trimmed, *moved(v)), (jnp.zeros(3),), (way,))
+        _, slope = jax.jvp(lambda v: trimmed_power(found, *moved(v)), (jnp.zeros(3),), (way,))
         near = (again(STEP * way) - again(-STEP * way)) / (2 * STEP)
         np.testing.assert_allclose(slope, near, rtol=1e-6)

@@ -13,7 +13,7 @@ from rotorjax.coupled import CoupledState, rhs
 from rotorjax.errors import InputError
 from rotorjax.ode.trajectory import integrate
 from rotorjax.trim.problem import inputs_at, node_azimuths, outputs_at, revolution
-from rotorjax.trim.run import Request, numbers, prepare, run
+from rotorjax.trim.run import numbers, prepare, request, run
 from rotorjax.trim.solve import power, trim, trimmed_power
 
 THRUST = 0.00575
@@ -21,12 +21,12 @@ THRUST = 0.00575
 
 @pytest.fixture(scope="module")
 def cruise():
-    return run(Request("uh60", THRUST, "pitt-peters", 0.2, tilt_deg=4.0))
+    return run(request("uh60", THRUST, "pitt-peters", 0.2, tilt_deg=4.0))
 
 
 @pytest.fixture(scope="module")
 def hover():
-    return run(Request("uh60", THRUST, "pitt-peters"))
+    return run(request("uh60", THRUST, "pitt-peters"))
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def test_a_revolution_marched_from_the_trim_ends_where_it_began(cruise):
 
 def test_a_thrust_beyond_stall_names_the_limit():
     """Below the bound that is refused at once, but more than the retreating blade can carry."""
-    found = run(Request("uh60", 0.012, "pitt-peters", 0.2, tilt_deg=4.0)).trimmed.outcome
+    found = run(request("uh60", 0.012, "pitt-peters", 0.2, tilt_deg=4.0)).trimmed.outcome
     assert not found.converged
     limit = float(found.why.split("C_T = ")[1].split(";")[0])
     assert 0.008 < limit < 0.012
@@ -130,14 +130,9 @@ def test_derivative_of_power_at_trim(cruise):
     ],
 )
 def test_bad_input(change, words):
-    request = Request(**{"rotor": "uh60", "thrust": THRUST, **change})
+    wanted = request(**{"rotor": "uh60", "thrust": THRUST, **change})
     with pytest.raises(InputError, match=words):
-        trim(*_of(prepare(request)))
-
-
-def _of(prepared):
-    p, flight, residual = prepared
-    return p, flight, residual
+        trim(*prepare(wanted))
 
 
 def test_the_command(tmp_path, capsys, cruise, told):

@@ -15,12 +15,10 @@ from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
-from rotorjax.trim.dispatch import check_request
 from rotorjax.trim.free_wake import hub_moment, residual
 from rotorjax.trim.in_wake import trim_in_wake, wake_trim
-from rotorjax.trim.in_wake_run import WakeResult, run_in_wake, wake_numbers
-from rotorjax.trim.run import Request
-from rotorjax.trim.wake_means import evaluated, means
+from rotorjax.trim.means import evaluated, means
+from rotorjax.trim.run import check, numbers, request, run
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 THRUST = 0.0058
@@ -29,13 +27,13 @@ TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "closure_turn
 
 @pytest.fixture(scope="module")
 def cruise():
-    request = Request("uh60", THRUST, "freewake", 0.2, tilt_deg=4.0)
-    return run_in_wake(request, flight_settings(4, **TINY, azimuths=8))
+    settings = flight_settings(4, **TINY, azimuths=8)
+    return run(request("uh60", THRUST, "freewake", 0.2, tilt_deg=4.0, wake=settings))
 
 
 @pytest.fixture(scope="module")
 def told(cruise):
-    return wake_numbers(cruise)
+    return numbers(cruise)
 
 
 @pytest.mark.slow
@@ -91,7 +89,7 @@ def test_hover_needs_no_cyclic_and_is_a_steady_state_of_the_coupled_rotor():
     assert flown.CP_parasite == 0
     assert 0.04 < flown.flap[0] < 0.07
     _lag_balances_the_torque(found, flown)
-    start = from_wake(WakeResult(Request("uh60", THRUST, "freewake"), found, 0.0, 0.0))
+    start = from_wake(found)
     rates, out = instant(start.x, start.inputs, start.p)
     still = (rates.rotor, rates.inflow)
     assert max(float(jnp.max(jnp.abs(leaf))) for leaf in jax.tree.leaves(still)) < 1e-6
@@ -141,7 +139,7 @@ def test_hub_moment_of_flapping_blades_without_air():
 
 def test_what_the_free_wake_cannot_do_is_refused():
     with pytest.raises(InputError, match="did you mean 'freewake'"):
-        check_request(Request("uh60", THRUST, "freewak"))
+        check(request("uh60", THRUST, "freewak"))
     climbing = rotor_inputs(w=-0.02, height=1.0)
     p = wake_trim(*load("uh60"), climbing, THRUST, plane(1.0))
     with pytest.raises(InputError, match="away from it: set climb = 0"):

@@ -1,4 +1,4 @@
-"""What a trim in the free wake comes to, over a revolution."""
+"""What a trim comes to over a revolution, with any inflow."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,15 @@ from rotorjax.rotor.flap_lag import damper_moment
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.trim.free_wake import InWake, WakeTrim, flown, harmonic, hub_moment, loads_of, weight_torque
 from rotorjax.trim.in_wake import TrimmedInWake
+from rotorjax.trim.problem import cyclic, outputs_at
+from rotorjax.trim.solve import Trimmed
 from rotorjax.wake.equilibrium import Evaluation, evaluate
 
 
 @dataclass(frozen=True)
 class Means:
     """Means over the azimuth: thrust and powers over ρA(ΩR)² and ρA(ΩR)³, flapping β₀, β₁c, β₁s and lagging ζ₀, ζ₁c,
-    ζ₁s (rad), moment (3,) on the hub over ρA(ΩR)²R, hub frame.
+    ζ₁s (rad), moment (3,) on the hub over ρA(ΩR)²R, hub frame; controls θ₀, θ₁c, θ₁s and the shaft's tilt (rad).
     """
 
     CT: float
@@ -29,10 +31,27 @@ class Means:
     flap: np.ndarray
     lag: np.ndarray
     moment: np.ndarray
+    controls: np.ndarray
 
 
-def means(found: TrimmedInWake) -> Means:
+def means(found: Trimmed | TrimmedInWake) -> Means:
     """Performance of a trim."""
+    return _in_wake(found) if isinstance(found, TrimmedInWake) else _in_model(found)
+
+
+def _in_model(found: Trimmed) -> Means:
+    out, z = outputs_at(found.z, found.flight, found.p), found.z.controls
+    powers = ("CT", "CQ", "CP_induced", "CP_profile", "CP_parasite", "CP_damper")
+    return Means(
+        **{name: float(jnp.mean(getattr(out, name))) for name in powers},
+        flap=np.array([float(jnp.mean(out.flap)), *map(float, cyclic(out.flap))]),
+        lag=np.array([float(jnp.mean(out.lag)), *map(float, cyclic(out.lag))]),
+        moment=np.asarray(jnp.mean(out.moment, axis=0)),
+        controls=np.array([float(v) for v in (z.theta_0, z.theta_1c, z.theta_1s, z.tilt)]),
+    )
+
+
+def _in_wake(found: TrimmedInWake) -> Means:
     _, loads = evaluated(found.z, found.p)
     z, p, blades = found.z, found.p, found.p.model.rotor.blades
     model = found.model
@@ -60,6 +79,7 @@ def means(found: TrimmedInWake) -> Means:
         flap=np.asarray(harmonic(z.flap)),
         lag=np.asarray(harmonic(z.lag)),
         moment=np.asarray(hub_moment(z.flap, z.lag, loads, p)),
+        controls=np.array([*z.controls, 0.0 if p.inputs.pitch is None else -p.inputs.pitch]),
     )
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from rotorjax import program_cache
-from rotorjax.program_cache import clean, opened, seal, trim
+from rotorjax.io import program_cache
+from rotorjax.io.program_cache import clean, opened, seal, trim
 
 
 @pytest.fixture
@@ -138,7 +138,7 @@ from rotorjax import cli
 folder = cli._set_up_jax()
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 print(float(jax.jit(lambda x: x * {factor})(2.0)))
-from rotorjax import program_cache
+from rotorjax.io import program_cache
 program_cache.seal(folder, settled=0.0)
 """
 
