@@ -7,7 +7,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, array, check_number, check_range, check_whole, known, shown
+from rotorjax.checks import Range, array, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
 
 _USUAL_AZIMUTHS = 8
@@ -152,9 +152,25 @@ def wake_settings(
 
     Raises InputError where a count, an angle or a length is out of range.
     """
-    numbers = (release, release_band, sharpness, tip_core, turbulence, inboard_core, near_core, control_core)
-    numbers += (control_chords, bound_core_chords, self_induction_core, inboard_decay, impulse_kept)
-    numbers += (stall_chords, circulation_lag)
+    numbers = {
+        "release": release,
+        "release_band": release_band,
+        "sharpness": sharpness,
+        "tip_core": tip_core,
+        "turbulence": turbulence,
+        "inboard_core": inboard_core,
+        "near_core": near_core,
+        "control_core": control_core,
+        "control_chords": control_chords,
+        "bound_core_chords": bound_core_chords,
+        "self_induction_core": self_induction_core,
+        "inboard_decay": inboard_decay,
+        "impulse_kept": impulse_kept,
+        "stall_chords": stall_chords,
+        "circulation_lag": circulation_lag,
+    }
+    for name, value in numbers.items():
+        check_range(name, value, _RANGES.get(name, _POSITIVE))
     settings = WakeSettings(
         panels,
         age_step_deg,
@@ -165,23 +181,21 @@ def wake_settings(
         azimuths,
         tuple(inboard),
         roll_up,
-        *map(array, numbers),
+        **{name: array(value) for name, value in numbers.items()},
     )
     _check_counts(settings)
     _check_roll_up(settings)
-    check_number("release", release, 0.0, 1.0)
-    check_number("release_band", release_band, 0.0, 0.1)
-    check_number("impulse_kept", impulse_kept, 0.0, 1.0)
-    for name in _POSITIVE:
-        check_range(name, getattr(settings, name), Range(0.0, 1e3, above=True))
-    for name in ("turbulence", "inboard_decay", "control_chords"):
-        check_range(name, getattr(settings, name), Range(0.0, 1e3))
     return settings
 
 
-_POSITIVE = ("sharpness", "tip_core", "inboard_core", "near_core", "control_core", "bound_core_chords")
+_POSITIVE, _NOT_NEGATIVE = Range(0.0, 1e3, above=True), Range(0.0, 1e3)
+_RANGES = {
+    "release": Range(0.0, 1.0),
+    "release_band": Range(0.0, 0.1),
+    "impulse_kept": Range(0.0, 1.0),
+    **dict.fromkeys(("turbulence", "inboard_decay", "control_chords"), _NOT_NEGATIVE),
+}
 _COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
-_POSITIVE += ("self_induction_core", "circulation_lag", "stall_chords")
 
 
 def _check_counts(settings: WakeSettings) -> None:
