@@ -22,7 +22,7 @@ class WakeSettings(eqx.Module):
         age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
             are free to move; closure_turns: further turns that repeat the last free one, one by one;
             closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py).
-        azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; None
+        azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; 0
             for eight or the next such multiple, which `for_blades` writes in.
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
@@ -68,7 +68,7 @@ class WakeSettings(eqx.Module):
     free_turns: float = eqx.field(static=True)
     closure_turns: int = eqx.field(static=True)
     closure_bundles: int = eqx.field(static=True)
-    azimuths: int | None = eqx.field(static=True)
+    azimuths: int = eqx.field(static=True)
     inboard: tuple[float, ...] = eqx.field(static=True)
     roll_up: RollUp = eqx.field(static=True)
     release: Float[Array, ""]
@@ -89,7 +89,7 @@ class WakeSettings(eqx.Module):
 
     def for_blades(self, blades: int) -> "WakeSettings":
         """These settings with a number of azimuths that suits a rotor, where none was asked for."""
-        return self if self.azimuths is not None else replace(self, azimuths=blades * -(-_USUAL_AZIMUTHS // blades))
+        return self if self.azimuths else replace(self, azimuths=blades * -(-_USUAL_AZIMUTHS // blades))
 
     @property
     def age_step(self) -> float:
@@ -129,7 +129,7 @@ def wake_settings(
     free_turns: float = 2.0,
     closure_turns: int = 2,
     closure_bundles: int = 5,
-    azimuths: int | None = None,
+    azimuths: int = 0,
     inboard: tuple[float, ...] = (0.45, 0.8),
     roll_up: RollUp = "impulse",
     release: float = 0.971,
@@ -195,14 +195,13 @@ _RANGES = {
     "impulse_kept": Range(0.0, 1.0),
     **dict.fromkeys(("turbulence", "inboard_decay", "control_chords"), _NOT_NEGATIVE),
 }
-_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
+_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 0, 360))
 
 
 def _check_counts(settings: WakeSettings) -> None:
     """Raise InputError where a number of panels, ages or turns does not work out."""
     for name, least, most in _COUNTS:
-        if (value := getattr(settings, name)) is not None:
-            check_whole(name, value, least, most)
+        check_whole(name, getattr(settings, name), least, most)
     step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))
