@@ -12,6 +12,11 @@ from jaxtyping import Array, ArrayLike, Float
 from rotorjax.checks import Range, array, known, number_of, refuse, shown
 
 
+def component(vectors: Float[Array, "*n 3"], unit: Float[Array, "3"]) -> Float[Array, "*n"]:
+    """Component of vectors along a unit vector; as a sum of products it is part of the loop that reads it."""
+    return jnp.sum(vectors * unit, axis=-1)
+
+
 class Plane(eqx.Module):
     """A plane under the hub, z = −h + x tan δ in the hub frame (Eq. 9): the mountain side is aft, ψ = 0.
 
@@ -33,7 +38,7 @@ class Plane(eqx.Module):
 
     def distance(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
         """Height of points above the plane along its normal, over R."""
-        return points @ self.normal + self.height * jnp.cos(self.slope)
+        return component(points, self.normal) + self.height * jnp.cos(self.slope)
 
     def reflect_points(self, points: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
         """Mirror images of points."""
@@ -41,7 +46,7 @@ class Plane(eqx.Module):
 
     def reflect_vectors(self, vectors: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
         """Mirror images of vectors: the component along the normal changes sign."""
-        return vectors - 2 * (vectors @ self.normal)[..., None] * self.normal
+        return vectors - 2 * component(vectors, self.normal)[..., None] * self.normal
 
 
 class TurnedPlane(Plane):

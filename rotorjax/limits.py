@@ -59,11 +59,16 @@ def check_place(model: str, height: float | None, slope_deg: float = 0.0) -> Non
         raise InputError(
             f"Argument `height` must be at least {limits.height:g} for {model} ({limits.why}), but is {height:g}"
         )
-    clearance = height * np.cos(slope) - np.sin(slope)
-    if slope_deg > limits.slope or clearance < limits.clearance:
+    if slope_deg > limits.slope:
+        others = " or ".join(name for name, other in TABLE.items() if slope_deg <= other.slope) or "less"
         raise InputError(
-            f"Argument `height` must leave the rim {limits.clearance:g} R over ground of at most {limits.slope:g} deg "
-            f"for {model}, but at {height:g} over {slope_deg:g} deg it leaves {clearance:.3g} R"
+            f"Argument `slope` must be at most {limits.slope:g} deg for {model}, but is {slope_deg:g}: use {others}"
+        )
+    clearance = height * np.cos(slope) - np.sin(slope)
+    if clearance < limits.clearance:
+        raise InputError(
+            f"Argument `height` must leave the rim {limits.clearance:g} R over the ground for {model}, but at "
+            f"{height:g} over {slope_deg:g} deg it leaves {clearance:.3g} R"
         )
 
 

@@ -123,6 +123,13 @@ BAD = {
     "study --out {tmp}/out --slopes 46": "must exceed tan",
     "study --out {tmp}/out --rotor {tmp}/misspelt.toml": "did you mean 'radius'",
     "study --out {tmp}/out --rotor {tmp}/gap.toml": "gap.csv",
+    f"calibrate freewake --cases {'x' * 300} --out {{tmp}}/out": "File name too long",
+    f"simulate --case {'x' * 300} --out {{tmp}}/out": "File name too long",
+    "inflow --rotor {tmp}/pipe.toml": "pipe.toml: the path must be a file, but is a pipe",
+    "inflow --rotor {tmp}/zero.toml": "zero.toml: the path must be a file, but is a device",
+    "inflow --calibration {tmp}/pipe.toml": "but is a pipe",
+    "simulate --case {tmp}/zero.toml --out {tmp}/out": "but is a device",
+    "deck --case {tmp}/pipe.toml --out {tmp}/out": "but is a pipe",
     "unknown": "unknown",
     "": "COMMAND",
 }
@@ -131,6 +138,8 @@ BAD = {
 @pytest.mark.parametrize("line", BAD)
 def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
     (tmp_path / "file").write_text("")
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
     (tmp_path / "misspelt.toml").write_text(ROTOR.replace("radius", "radus"))
     (tmp_path / "gap.toml").write_text(ROTOR)
     (tmp_path / "gap.csv").write_text("alpha_deg,cl,cd\n-180,0,0\n0,,0.01\n180,0,0\n")

@@ -22,9 +22,11 @@ def register(commands: argparse._SubParsersAction) -> None:
         "1 where the fit did not converge or a parameter ended at a bound.",
     )
     targets = parser.add_subparsers(dest="target", metavar="TARGET", required=True, parser_class=type(parser))
-    hayden = targets.add_parser("hayden", help="factor b^(eta^p) against Hayden's k_G at constant thrust")
+    hayden = targets.add_parser("hayden", help="contraction of the wake against Hayden's k_G at constant thrust")
     hayden.add_argument("--heights", nargs="+", type=float, metavar="H", help="over R (0.5 0.75 1 1.5 2 3)")
-    hayden.add_argument("--parameters", default="b,p", metavar="NAMES", help="what to fit, by commas (b,p)")
+    hayden.add_argument(
+        "--parameters", default="radius,clearance", metavar="NAMES", help="what to fit, by commas (radius,clearance)"
+    )
     loads = hayden.add_mutually_exclusive_group()
     loads.add_argument("--loading", choices=LOADINGS, default="elliptic", help="given loading (elliptic)")
     loads.add_argument("--cases", type=Path, metavar="FILE", help="blade loads of a study: cases.nc or its folder")

@@ -101,6 +101,7 @@ def check(request: Request) -> None:
     check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
     check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
     check_flight(request.inflow, request.thrust, request.climb, request.advance)
+    check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
     if request.height is not None and request.climb:
@@ -109,14 +110,13 @@ def check(request: Request) -> None:
         )
     if float(request.operating.climb):
         raise InputError(
-            "[operating] climb must be 0 in a rotor file that is trimmed, but is "
-            f"{float(request.operating.climb):g} m/s, which has no effect: give the climb to the trim"
+            f"[operating] climb must be 0 in a rotor file that is trimmed, but is {float(request.operating.climb):g} "
+            "m/s, which has no effect: give the climb to the trim"
         )
     blade_of(request.rotor, request.operating)
     _ = request.flight, request.ground
     if request.inflow != FREE_WAKE:
         inflow_model(request.inflow, request.ground)
-    check_place(request.inflow, request.height, request.slope_deg)
 
 
 def run(request: Request, start: Result | None = None, progress: Progress | None = None) -> Result:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, component
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.vortex_core import core_radius
 
@@ -148,7 +148,7 @@ def _log_cosh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
 
 
 def _heights(nodes: Float[Array, "*n 3"], normal: Float[Array, "3"], plane: Plane) -> Float[Array, "*n"]:
-    return nodes @ normal + plane.height * jnp.cos(plane.slope)
+    return component(nodes, normal) + plane.height * jnp.cos(plane.slope)
 
 
 def _steps(model: FreeWake) -> tuple[Float[np.ndarray, " S"], Float[np.ndarray, " S"]]:

@@ -21,7 +21,7 @@ from rotorjax.wake import kernel_sweeps
 from rotorjax.wake.field import self_induction
 from rotorjax.wake.kernel_pairs import cross, pairs, slopes
 from rotorjax.wake.model import FreeWake, WakeState, along_blade
-from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, near_lattice, releases
+from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
 
 
 class PairDerivatives(NamedTuple):
@@ -85,19 +85,31 @@ def velocity_response(model: FreeWake, state: WakeState, phase: Float[Array, ""]
         far = far_filaments(model, s, releases(model, s), jnp.zeros(()))
         return _kernel_form(join(near, far, bound_vortex(model, s.gamma_bound)))
 
-    def sharpened(v):
-        s = unravel(v)
-        fine = near_lattice(model, s, model.settings.control_core)
-        smooth = near_lattice(model, s, model.settings.near_core)
-        return _kernel_form(join(fine, smooth._replace(strength=-smooth.strength)))
-
-    targets = nodes(own)
+    targets, segments = nodes(own), everything(flat)
     moved = jax.jacfwd(lambda v: nodes(unravel(v)))(flat)
-    at_targets, by_segments = _blade_sum(model, targets, everything(flat), phase)
+    at_targets, by_segments = _blade_sum(model, targets, segments, phase)
+    near = slice(len(places)), slice(lattice_segments(model))
+    lattice = jax.tree.map(lambda a: a[..., near[1]], segments)
+    sharper = _sharpened(places, lattice, model.settings.control_core)
+    by_segments = jax.tree.map(lambda whole, own: whole.at[near].add(own), by_segments, sharper)
     whole = _chain(by_segments, everything, flat) + jnp.einsum("nij,njm->nim", at_targets, moved)
-    local = _chain(pair_derivatives(places, sharpened(flat)), sharpened, flat)
     bend = jax.jacfwd(lambda v: self_induction(model, unravel(v)))(flat).reshape(-1, 3, flat.size)
-    return whole.at[: len(places)].add(local).at[len(targets) - len(bend) :].add(bend)
+    return whole.at[len(targets) - len(bend) :].add(bend)
+
+
+def _sharpened(points: Float[Array, "N 3"], lattice: kernel_sweeps.Segments, fine: Float[Array, ""]) -> PairDerivatives:
+    """Derivatives of `biot_savart.sharpened_velocity`, the fine core's softening |l|² fine² moving with the ends."""
+    edge = (lattice.end - lattice.start).T
+    softs = jnp.stack([jnp.sum(edge**2, axis=-1) * fine**2, lattice.soft])
+    both = jax.vmap(lambda soft: pair_derivatives(points, lattice._replace(soft=soft)))(softs)
+    thin, thick = PairDerivatives(*(d[0] for d in both)), PairDerivatives(*(d[1] for d in both))
+    stretched = 2 * fine**2 * thin.soft[..., None] * edge[:, None]
+    return PairDerivatives(
+        thin.start - thick.start - stretched,
+        thin.end - thick.end + stretched,
+        thin.strength - thick.strength,
+        -thick.soft,
+    )
 
 
 def _blade_sum(model: FreeWake, targets, segments, phase):
@@ -142,7 +154,6 @@ def _chain(by_segments: PairDerivatives, of_state: Callable, flat: Float[Array, 
     # one row for each point and component: segments stand last but one, or last
     rows = [jnp.swapaxes(d, 1, 2) for d in by_segments]
     rows = [d.reshape(-1, *d.shape[2:]) for d in rows]
-    real = jax.vmap(row)(*(jnp.real(d) for d in rows))
-    if not jnp.iscomplexobj(rows[0]):
-        return real.reshape(-1, 3, flat.size)
-    return (real + 1j * jax.vmap(row)(*(jnp.imag(d) for d in rows))).reshape(-1, 3, flat.size)
+    parts = [jnp.concatenate([jnp.real(d), jnp.imag(d)]) for d in rows]
+    real, imaginary = jax.vmap(row)(*parts).reshape(2, -1, 3, flat.size)
+    return real + 1j * imaginary

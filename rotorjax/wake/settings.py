@@ -5,24 +5,49 @@ from typing import Any, Literal, get_args
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from rotorjax.checks import Range, array, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
 
 _USUAL_AZIMUTHS = 8
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
+Number = Any  # Float[Array, ""]; given as a plain number too
+_POSITIVE, _AT_LEAST_0 = Range(0.0, 1e3, above=True), Range(0.0, 1e3)
+RANGES: dict[str, Range] = {
+    "release": Range(0.0, 1.0),
+    "release_band": Range(0.0, 0.1),
+    "sharpness": _POSITIVE,
+    "tip_core": _POSITIVE,
+    "turbulence": _AT_LEAST_0,
+    "inboard_core": _POSITIVE,
+    "near_core": _POSITIVE,
+    "control_core": _POSITIVE,
+    "control_chords": _AT_LEAST_0,
+    "bound_core_chords": _POSITIVE,
+    "self_induction_core": _POSITIVE,
+    "inboard_decay": _AT_LEAST_0,
+    "impulse_kept": Range(0.0, 1.0),
+    "stall_chords": _POSITIVE,
+    "circulation_lag": _POSITIVE,
+}
+"""What each differentiable setting may be."""
 
 
 class WakeSettings(eqx.Module):
-    """Settings of the free wake; make them with `wake_settings`, which checks them.
+    """Settings of the free wake, by keyword; the defaults suit hover in and out of ground effect.
+
+    Raises InputError where a count, an angle or a length is out of range.
+
+    >>> WakeSettings(panels=12, tip_core=0.03).panels
+    12
 
     Static (they fix array shapes):
         panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip.
         age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
             are free to move; closure_turns: further turns that repeat the last free one, one by one;
             closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py).
-        azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; 0
+        azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; None
             for eight or the next such multiple, which `for_blades` writes in.
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
@@ -62,34 +87,42 @@ class WakeSettings(eqx.Module):
         circulation_lag: time constant (rad) of the filter between blade-element and bound circulation.
     """
 
-    panels: int = eqx.field(static=True)
-    age_step_deg: float = eqx.field(static=True)
-    near_wake_deg: float = eqx.field(static=True)
-    free_turns: float = eqx.field(static=True)
-    closure_turns: int = eqx.field(static=True)
-    closure_bundles: int = eqx.field(static=True)
-    azimuths: int = eqx.field(static=True)
-    inboard: tuple[float, ...] = eqx.field(static=True)
-    roll_up: RollUp = eqx.field(static=True)
-    release: Float[Array, ""]
-    release_band: Float[Array, ""]
-    sharpness: Float[Array, ""]
-    tip_core: Float[Array, ""]
-    turbulence: Float[Array, ""]
-    inboard_core: Float[Array, ""]
-    near_core: Float[Array, ""]
-    control_core: Float[Array, ""]
-    control_chords: Float[Array, ""]
-    bound_core_chords: Float[Array, ""]
-    self_induction_core: Float[Array, ""]
-    inboard_decay: Float[Array, ""]
-    impulse_kept: Float[Array, ""]
-    stall_chords: Float[Array, ""]
-    circulation_lag: Float[Array, ""]
+    panels: int = eqx.field(static=True, default=14)
+    age_step_deg: float = eqx.field(static=True, default=15.0)
+    near_wake_deg: float = eqx.field(static=True, default=90.0)
+    free_turns: float = eqx.field(static=True, default=2.0)
+    closure_turns: int = eqx.field(static=True, default=2)
+    closure_bundles: int = eqx.field(static=True, default=5)
+    azimuths: int = eqx.field(static=True, default=None)  # type: ignore[assignment]  (a number from `for_blades` on)
+    inboard: tuple[float, ...] = eqx.field(static=True, default=(0.45, 0.8))
+    roll_up: RollUp = eqx.field(static=True, default="impulse")
+    release: Number = 0.971
+    release_band: Number = 0.0165
+    sharpness: Number = 20.0
+    tip_core: Number = 0.025
+    turbulence: Number = 4e-4
+    inboard_core: Number = 0.12
+    near_core: Number = 0.029
+    control_core: Number = 0.002
+    control_chords: Number = 0.5
+    bound_core_chords: Number = 0.55
+    self_induction_core: Number = 0.0085
+    inboard_decay: Number = 0.5
+    impulse_kept: Number = 0.5
+    stall_chords: Number = 0.5
+    circulation_lag: Number = 0.1
+
+    def __post_init__(self) -> None:
+        """Check every number and make the differentiable ones arrays."""
+        self.inboard = tuple(self.inboard)
+        for name, allowed in RANGES.items():
+            setattr(self, name, array(check_range(name, getattr(self, name), allowed)))
+        _check_counts(self)
+        _check_roll_up(self)
 
     def for_blades(self, blades: int) -> "WakeSettings":
         """These settings with a number of azimuths that suits a rotor, where none was asked for."""
-        return self if self.azimuths else replace(self, azimuths=blades * -(-_USUAL_AZIMUTHS // blades))
+        return self if self.azimuths is not None else replace(self, azimuths=blades * -(-_USUAL_AZIMUTHS // blades))
 
     @property
     def age_step(self) -> float:
@@ -122,86 +155,17 @@ class WakeSettings(eqx.Module):
         return 1 + len(self.inboard)
 
 
-def wake_settings(
-    panels: int = 14,
-    age_step_deg: float = 15.0,
-    near_wake_deg: float = 90.0,
-    free_turns: float = 2.0,
-    closure_turns: int = 2,
-    closure_bundles: int = 5,
-    azimuths: int = 0,
-    inboard: tuple[float, ...] = (0.45, 0.8),
-    roll_up: RollUp = "impulse",
-    release: float = 0.971,
-    release_band: float = 0.0165,
-    sharpness: float = 20.0,
-    tip_core: float = 0.025,
-    turbulence: float = 4e-4,
-    inboard_core: float = 0.12,
-    near_core: float = 0.029,
-    control_core: float = 0.002,
-    control_chords: float = 0.5,
-    bound_core_chords: float = 0.55,
-    self_induction_core: float = 0.0085,
-    inboard_decay: float = 0.5,
-    impulse_kept: float = 0.5,
-    stall_chords: float = 0.5,
-    circulation_lag: float = 0.1,
-) -> WakeSettings:
-    """Make settings from plain numbers; the defaults suit hover in and out of ground effect.
-
-    Raises InputError where a count, an angle or a length is out of range.
-    """
-    numbers = {
-        "release": release,
-        "release_band": release_band,
-        "sharpness": sharpness,
-        "tip_core": tip_core,
-        "turbulence": turbulence,
-        "inboard_core": inboard_core,
-        "near_core": near_core,
-        "control_core": control_core,
-        "control_chords": control_chords,
-        "bound_core_chords": bound_core_chords,
-        "self_induction_core": self_induction_core,
-        "inboard_decay": inboard_decay,
-        "impulse_kept": impulse_kept,
-        "stall_chords": stall_chords,
-        "circulation_lag": circulation_lag,
-    }
-    for name, value in numbers.items():
-        check_range(name, value, _RANGES.get(name, _POSITIVE))
-    settings = WakeSettings(
-        panels,
-        age_step_deg,
-        near_wake_deg,
-        free_turns,
-        closure_turns,
-        closure_bundles,
-        azimuths,
-        tuple(inboard),
-        roll_up,
-        **{name: array(value) for name, value in numbers.items()},
-    )
-    _check_counts(settings)
-    _check_roll_up(settings)
-    return settings
+wake_settings = WakeSettings
 
 
-_POSITIVE, _NOT_NEGATIVE = Range(0.0, 1e3, above=True), Range(0.0, 1e3)
-_RANGES = {
-    "release": Range(0.0, 1.0),
-    "release_band": Range(0.0, 0.1),
-    "impulse_kept": Range(0.0, 1.0),
-    **dict.fromkeys(("turbulence", "inboard_decay", "control_chords"), _NOT_NEGATIVE),
-}
-_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 0, 360))
+_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
 
 
 def _check_counts(settings: WakeSettings) -> None:
     """Raise InputError where a number of panels, ages or turns does not work out."""
     for name, least, most in _COUNTS:
-        check_whole(name, getattr(settings, name), least, most)
+        if (value := getattr(settings, name)) is not None:
+            check_whole(name, value, least, most)
     step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))

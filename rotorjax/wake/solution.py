@@ -144,6 +144,7 @@ def _fits(start: Solution, model: FreeWake) -> bool:
 
 def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution:
     """Evaluate the wake that a search ended with, and collect what a user wants of it, as numbers."""
+    model = jax.tree.map(jnp.asarray, model)  # a search reckons with numpy's, which do not go into a traced function
     change, evaluation = look(model, x)
     moved = jax.tree.map(lambda a, b: np.asarray(a) + np.asarray(b), x, change)
     then = _read_off(model, look(model, moved)[1])["CT"]

@@ -21,7 +21,7 @@ PRINTED = {
     "hayden": Calibration("hayden", hayden.PARAMETERS.table(hayden.PARAMETERS.printed), True, 0.18),
     "freewake": Calibration("freewake", taught.PARAMETERS.table(taught.PARAMETERS.printed), True, 0.3),
 }
-FITTED = Calibration("hayden", {"b": 0.09, "p": 1.3}, False, 0.004)
+FITTED = Calibration("hayden", {"radius": 0.75, "clearance": 0.6}, False, 0.004)
 
 
 @pytest.fixture(scope="module")

@@ -33,6 +33,15 @@ def test_the_periodic_wake_is_where_the_marched_equations_rest(hover):
         assert max(float(jnp.max(jnp.abs(a))) for a in jax.tree.leaves(rate)) < 1e-5
 
 
+def test_rates_have_derivatives_by_the_inputs(hover):
+    """Forward mode by numbers that the points do not depend on: tangents that are batched, points that are not."""
+    inputs = inputs_of(hover.model)
+    rate = eqx.filter_jit(lambda inputs: rhs(0.0, hover.state, inputs, hover.model).gamma_bound)
+    slope = jax.jacfwd(rate)(inputs).collective
+    moved = [inputs._replace(collective=inputs.collective + s) for s in (1e-5, -1e-5)]
+    np.testing.assert_allclose(slope, (rate(moved[0]) - rate(moved[1])) / 2e-5, rtol=1e-5, atol=1e-7)
+
+
 @pytest.fixture(scope="module")
 def grounded(uh60, coarse, hover):
     return solve(free_wake(*uh60, plane(1.0), coarse), start=hover)

@@ -1,0 +1,58 @@
+"""How many programs a wake takes, and how long they are: what a first answer waits for is the compiler.
+
+Counts, not seconds, so that no busy machine upsets them. A fusion costs about 50 ms to compile, whatever it does.
+"""
+
+import re
+
+import equinox as eqx
+import jax
+import pytest
+from wakes import COARSE
+
+from rotorjax.ground import plane
+from rotorjax.wake.equilibrium import evaluate
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.solution import solve
+from rotorjax.wake.start import prescribed
+
+COMPILED = "/jax/core/compile/backend_compile_duration"
+PROGRAMS = []
+
+
+@pytest.fixture
+def programs():
+    """Names of the programs made, also of those that the cache on disk spares compiling."""
+
+    def hear(event, duration, **about):
+        if event == COMPILED:
+            PROGRAMS.append(about.get("fun_name", event))
+
+    jax.clear_caches()
+    PROGRAMS.clear()
+    jax.monitoring.register_event_duration_secs_listener(hear)
+    yield PROGRAMS
+    jax.monitoring.unregister_event_duration_listener(hear)
+
+
+def test_a_wake_takes_few_programs(uh60, coarse, programs):
+    """One that evaluates, one that multiplies, one that reads off, and what lays out the start."""
+    hover = solve(free_wake(*uh60, None, coarse))
+    assert hover.converged
+    assert len(programs) <= 15, programs
+    programs.clear()
+    assert solve(free_wake(*uh60, plane(1.0), coarse), hover).converged
+    assert len(programs) <= 8, programs
+    programs.clear()
+    assert solve(free_wake(*uh60, plane(1.3), coarse), hover).converged
+    assert not programs
+
+
+@pytest.mark.parametrize(("ground", "most"), [(None, 120), (plane(1.0), 165)], ids=["free", "level"])
+def test_an_evaluation_is_a_short_program(uh60, ground, most):
+    model = free_wake(*uh60, ground, wake_settings(**COARSE))
+    arrays, rest = eqx.partition(model, eqx.is_array)
+    program = jax.jit(lambda arrays, x: evaluate(eqx.combine(arrays, rest), x))
+    text = program.lower(arrays, prescribed(model)).compile().as_text()
+    assert len(re.findall(r" fusion\(", text)) <= most
