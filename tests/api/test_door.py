@@ -51,7 +51,7 @@ def test_rooms_with_the_name_of_a_function_are_both(uh60):
     from rotorjax.rotor import geometry
 
     assert rj.rotor.geometry is geometry
-    assert rj.rotor("uh60")[0].name == "uh60"
+    assert rj.rotor("uh60")[0].name == "UH-60A"
     assert float(jnp.rad2deg(uh60[1].collective)) == pytest.approx(18.0)
 
 
