@@ -1,8 +1,8 @@
 """Compile and run time of the free wake's solve under XLA's start-up flags, each in a process with an empty cache.
 
-`python benchmarks/xla_flags.py [--height H] [--rounds N] [--only NAME …]` prints a row a flag: the cold solve's time,
-what of it is compiling, and the same solve again in that process, when everything is compiled (the median of five).
-Processor time, over all threads, is what other jobs disturb least.
+`python benchmarks/xla_flags.py [--height H [--slope DEG]] [--rounds N] [--only NAME …]` prints a row a flag: the cold
+solve's time, what of it is compiling, and the same solve again in that process, when everything is compiled (the median
+of five; one over a slope). Processor time, over all threads, is what other jobs disturb least.
 """
 
 import argparse
@@ -32,20 +32,20 @@ from rotorjax.bench.single import single_case
 
 def solved():
     wall, busy = time.perf_counter(), time.process_time()
-    data, _ = single_case(Case({height}), study_settings(), "freewake")
+    data, _ = single_case(Case({height}, {slope}), study_settings(), "freewake")
     return data, time.perf_counter() - wall, time.process_time() - busy
 
 cold, wall, busy = solved()
-again = sorted(solved()[1:] for _ in range(5))[2]
+again = sorted(solved()[1:] for _ in range({repeats}))[{repeats} // 2]
 compiling, ct = float(cold["compile_time_s"]), float(cold["CT"])
 print(json.dumps(dict(wall=wall, busy=busy, compiling=compiling, again=again[0], again_busy=again[1], CT=ct)))
 """
 
 
-def measured(flags: str, height: float | None) -> dict[str, float]:
+def measured(flags: str, height: float | None, slope: float) -> dict[str, float]:
     """One cold process: wall and processor times (s) of a first solve and of the same again, and C_T."""
     env = {k: v for k, v in os.environ.items() if not k.startswith(("JAX_", "XLA_"))} | {"XLA_FLAGS": flags}
-    code = SOLVE.format(height=height)
+    code = SOLVE.format(height=height, slope=slope, repeats=1 if slope else 5)
     run = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True)
     return json.loads(run.stdout.splitlines()[-1])
 
@@ -54,6 +54,7 @@ def main() -> None:
     """Measure and print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--height", type=float)
+    parser.add_argument("--slope", type=float, default=0.0)
     parser.add_argument("--rounds", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=FLAGS, default=list(FLAGS))
     chosen = parser.parse_args()
@@ -63,7 +64,7 @@ def main() -> None:
     for _ in range(chosen.rounds):
         for name in chosen.only:
             try:
-                row = measured(FLAGS[name], chosen.height)
+                row = measured(FLAGS[name], chosen.height, chosen.slope)
             except subprocess.CalledProcessError as error:
                 print(f"| {name} | {(error.stderr or '').strip().splitlines()[-1:]} |", flush=True)
                 continue

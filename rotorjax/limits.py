@@ -28,6 +28,17 @@ class Limits(NamedTuple):
     why: str
 
 
+def markdown() -> str:
+    """`TABLE` as docs/limits.md holds it."""
+    rows = [
+        f"| {name} | {limits.height:g} | {limits.clearance:g} | {limits.slope:g} | {limits.advance:g} | "
+        f"{', '.join(limits.states)} | {limits.why} |"
+        for name, limits in TABLE.items()
+    ]
+    head = "| model | height over R, at least | rim over R | slope, deg, at most | μ, at most | axial flight | why |"
+    return "\n".join([head, "|---" * 7 + "|", *rows])
+
+
 _UPRIGHT: tuple[FlightState, ...] = ("hover", "climb", "slow descent")
 _ALL: tuple[FlightState, ...] = (*_UPRIGHT, "windmill brake")
 TABLE: dict[str, Limits] = {
@@ -48,11 +59,16 @@ def check_place(model: str, height: float | None, slope_deg: float = 0.0) -> Non
         raise InputError(
             f"Argument `height` must be at least {limits.height:g} for {model} ({limits.why}), but is {height:g}"
         )
-    clearance = height * np.cos(slope) - np.sin(slope)
-    if slope_deg > limits.slope or clearance < limits.clearance:
+    if slope_deg > limits.slope:
+        others = " or ".join(name for name, other in TABLE.items() if slope_deg <= other.slope) or "less"
         raise InputError(
-            f"Argument `height` must leave the rim {limits.clearance:g} R over ground of at most {limits.slope:g} deg "
-            f"for {model}, but at {height:g} over {slope_deg:g} deg it leaves {clearance:.3g} R"
+            f"Argument `slope` must be at most {limits.slope:g} deg for {model}, but is {slope_deg:g}: use {others}"
+        )
+    clearance = height * np.cos(slope) - np.sin(slope)
+    if clearance < limits.clearance:
+        raise InputError(
+            f"Argument `height` must leave the rim {limits.clearance:g} R over the ground for {model}, but at "
+            f"{height:g} over {slope_deg:g} deg it leaves {clearance:.3g} R"
         )
 
 

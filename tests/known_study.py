@@ -11,11 +11,11 @@ from rotorjax.calibration.taught import PARAMETERS, taught_model, taught_state
 from rotorjax.potential.model import disk_inflow, finite_state_model
 
 TRUTH = {
+    "radius": 0.82,
+    "length": 0.3,
+    "clearance": 0.5,
     "mean_gain": 1.13,
-    "third_gain": 1.02,
-    "fifth_gain": -0.5,
-    "reach": 0.5,
-    "source_gain": 2.5,
+    "third_gain": 0.9,
     "slope_share": 0.4,
 }
 REFERENCE = 0.06
@@ -29,7 +29,7 @@ def known_study(noise: float = 0.0) -> xr.Dataset:
     x, y = jnp.asarray(R * np.cos(PSI)[:, None]), jnp.asarray(R * np.sin(PSI)[:, None])
     for i, case in enumerate(cases):
         model = finite_state_model(case.ground, harmonics=1, ground_harmonics=1, ground_radial_terms=4)
-        tau = jnp.zeros(9).at[:4].set(jnp.array([2.6e-3, 6e-4 + 2e-5 * i, 3e-4 - 2e-5 * i, 1e-5 * i]))
+        tau = jnp.zeros(9).at[:4].set(jnp.array([2.6e-3, -9e-4 + 2e-5 * i, 3e-4 - 2e-5 * i, 1e-5 * i]))
         model = taught_model(model, values)
         fields.append(np.asarray(disk_inflow(taught_state(model, tau, values), x, y, model)))
         taus.append(np.asarray(tau))

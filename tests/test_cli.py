@@ -10,7 +10,7 @@ import pytest
 from wakes import fails_at, made_up
 
 from rotorjax.bench.single import single_case
-from rotorjax.cli import main
+from rotorjax.cli import WITHOUT_FREE_WAKE, main
 from rotorjax.io import netcdf
 from rotorjax.study.run import solve_cases
 
@@ -123,6 +123,13 @@ BAD = {
     "study --out {tmp}/out --slopes 46": "must exceed tan",
     "study --out {tmp}/out --rotor {tmp}/misspelt.toml": "did you mean 'radius'",
     "study --out {tmp}/out --rotor {tmp}/gap.toml": "gap.csv",
+    f"calibrate freewake --cases {'x' * 300} --out {{tmp}}/out": "File name too long",
+    f"simulate --case {'x' * 300} --out {{tmp}}/out": "File name too long",
+    "inflow --rotor {tmp}/pipe.toml": "pipe.toml: the path must be a file, but is a pipe",
+    "inflow --rotor {tmp}/zero.toml": "zero.toml: the path must be a file, but is a device",
+    "inflow --calibration {tmp}/pipe.toml": "but is a pipe",
+    "simulate --case {tmp}/zero.toml --out {tmp}/out": "but is a device",
+    "deck --case {tmp}/pipe.toml --out {tmp}/out": "but is a pipe",
     "unknown": "unknown",
     "": "COMMAND",
 }
@@ -131,6 +138,8 @@ BAD = {
 @pytest.mark.parametrize("line", BAD)
 def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
     (tmp_path / "file").write_text("")
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.toml").symlink_to("/dev/zero")
     (tmp_path / "misspelt.toml").write_text(ROTOR.replace("radius", "radus"))
     (tmp_path / "gap.toml").write_text(ROTOR)
     (tmp_path / "gap.csv").write_text("alpha_deg,cl,cd\n-180,0,0\n0,,0.01\n180,0,0\n")
@@ -183,6 +192,29 @@ def test_compiled_programs_are_kept_for_the_next_run(tmp_path):
 
     assert Path(folder(XDG_CACHE_HOME=str(tmp_path)).strip()).parent == tmp_path / "rotorjax" / "programs"
     assert folder(JAX_COMPILATION_CACHE_DIR="elsewhere").strip() == "elsewhere"
+
+
+FLAGS = """
+import sys, os
+from rotorjax import cli
+from rotorjax.commands import inflow, trim
+inflow.run = trim.run = lambda _: print("FLAGS", os.environ["XLA_FLAGS"]) or 0
+cli.main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "quick"),
+    [("inflow", False), ("inflow --model vpbfsm", True), ("trim --thrust-coefficient 0.006", True)],
+)
+def test_only_what_solves_no_free_wake_is_compiled_the_older_way(line, quick):
+    env = {k: v for k, v in os.environ.items() if k != "XLA_FLAGS"} | {"XLA_FLAGS": "--xla_cpu_enable_fast_math=false"}
+    run = subprocess.run(
+        [sys.executable, "-c", FLAGS, *line.split()], env=env, capture_output=True, text=True, check=True
+    )
+    flags = run.stdout.split()[1:]
+    assert flags[-1] == "--xla_cpu_enable_fast_math=false"  # the user's own count
+    assert (WITHOUT_FREE_WAKE in flags) == quick
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])

@@ -69,25 +69,28 @@ def terms_study(data: xr.Dataset, settings: StudySettings) -> dict[str, xr.Varia
     limited = replace(settings, radial_terms=max(TERMS))
     full = finite_state.from_loads(Case(), limited, data["free_wake_dct_dr"].to_numpy(), stations)
     modes = finite_state.model_of(Case(), limited).modes
-    inflow, difference = [], []
+    inflow, difference = [], {"vpbfsm": [], "printed": []}
     for terms in TERMS:
         tau = np.where(modes.n < 2 * terms + modes.m, np.asarray(full.tau), 0.0)  # each τ is what it is without others
         result = finite_state.of_pressure(Case(), limited, tau, stations)
         inflow.append(np.asarray(result.inflow_grid)[0])
-        shown = data.assign(vpbfsm_inflow=(("station_azimuth", "radius"), np.asarray(result.inflow)))
-        difference.append(inflow_rms_difference(shown, float(data["free_wake_mean_inflow"])))
+        for model, field in (("vpbfsm", result.inflow), ("printed", result.printed_inflow)):
+            shown = data.assign({f"{model}_inflow": (("station_azimuth", "radius"), np.asarray(field))})
+            difference[model].append(inflow_rms_difference(shown, float(data["free_wake_mean_inflow"]), model))
     about = "VPBFSM out of ground effect by number of pressure terms: inflow over ΩR"
     rms = "rms difference to the free wake by number of pressure terms, over its mean inflow"
     return {
         "terms": xr.Variable("terms", np.array(TERMS), {"units": "1"}),
         "vpbfsm_inflow_by_terms": xr.Variable(("terms", "grid_radius"), inflow, {"units": "1", "long_name": about}),
-        "inflow_rms_difference_by_terms": xr.Variable("terms", difference, {"units": "1", "long_name": rms}),
+    } | {
+        f"{model}_rms_difference_by_terms": xr.Variable("terms", values, {"units": "1", "long_name": rms})
+        for model, values in difference.items()
     }
 
 
 def _uniform(data: xr.Dataset, count: int, reference: float) -> xr.Dataset:
     """One case on `count` azimuths, without the wake's state, with its differences."""
-    for model in ("vpbfsm", "exact_image", *(["calibrated"] if "calibrated_inflow" in data else [])):
+    for model in ("vpbfsm", "printed", "exact_image", *(["calibrated"] if "calibrated_inflow" in data else [])):
         value = inflow_rms_difference(data, reference, model)
         about = f"rms difference of the {model} inflow and the free wake's, 0.25 <= r/R <= 0.95, both over the OGE mean"
         data = data.assign(

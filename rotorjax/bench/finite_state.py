@@ -1,10 +1,10 @@
-"""The VPBFSM of one case: driven by given blade loads, or by those of its own inflow; paper's factor and exact image.
+"""The VPBFSM of one case: driven by given blade loads, or by those of its own inflow; as printed, and exact image too.
 
 All that a case needs is evaluated at once, in one compiled function that every case over ground shares: each separate
 evaluation of the Legendre functions costs seconds of compilation and microseconds of work.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,68 +14,72 @@ from jaxtyping import Array, Float
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
-from rotorjax.inflow.momentum import VORTEX_RING
+from rotorjax.inflow.balance import Balance, Stations, axial_state, balance, pressure, stations_of
 from rotorjax.limits import check_axial, check_flight
 from rotorjax.potential import loading, rigid_cylinder
-from rotorjax.potential.ground_source import DiskQuadrature, correlation
+from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import (
     FiniteState,
     FiniteStateModel,
     disk_inflow,
     finite_state_model,
     ground_normal_velocity_rms,
-    mass_flow_parameters,
+    mean_inflow,
 )
-from rotorjax.rotor.blade_element import RotorCoefficients, SectionLoads, disk_loading, section_loads
-from rotorjax.rotor.blade_element import rotor_coefficients as coefficients_of
 
 GRID_R = np.linspace(0.0, 1.0, 64)  # 64 × 72 points of the disk for pictures
 GRID_PSI = np.linspace(0.0, 2 * np.pi, 72, endpoint=False)
 DIAMETER_PSI = np.array([0.0, np.pi])  # mountain side, valley side
-PATCH = DiskQuadrature(80, 128)  # of the exact image's source patch: 1e-5 down to a clearance of 0.16 R
-ALONE_AZIMUTHS, ALONE_PANELS = 24, 48
-
-
-class Stations(eqx.Module):
-    """Where the blades carry load. r, widths (R,): over R. psi (K,): equally spaced azimuths over one turn (rad)."""
-
-    r: Float[Array, " R"]
-    widths: Float[Array, " R"]
-    psi: Float[Array, " K"]
+PATCH = DiskQuadrature(48, 64)  # of the exact image's source patch on a slope
 
 
 class FiniteStateResult(NamedTuple):
     """A steady VPBFSM solution and its fields; inflow λ over ΩR, positive down.
 
-    tau (M,): pressure coefficients. states: rotor and ground. inflow, exact_image_inflow, dct_dr (K, R): at the
-    stations, with the paper's factor, over the exact image, and the loading that tau stands for. inflow_grid,
-    dct_dr_grid (72, 64): on GRID_PSI × GRID_R. exact_image_diameter (2, 64): on DIAMETER_PSI × GRID_R. mean_inflow,
-    exact_image_mean_inflow: area-weighted over the whole disk. ground_normal_velocity_rms: velocity left on the ground
-    inside the wake radius over the incoming flow, NaN without ground.
+    tau (M,): pressure coefficients. states: rotor and ground. inflow, printed_inflow, exact_image_inflow, dct_dr (K,
+    R): at the stations, of the default model, of the paper's own, of that over the exact image of its cylinder, and the
+    loading that tau stands for. inflow_grid, dct_dr_grid (72, 64): on GRID_PSI × GRID_R. printed_diameter,
+    exact_image_diameter (2, 64): on DIAMETER_PSI × GRID_R. mean_inflow, printed_mean_inflow, exact_image_mean_inflow:
+    area-weighted over the whole disk. ground_normal_velocity_rms, printed_ground_normal_velocity_rms: velocity left on
+    the ground inside the wake radius over the incoming flow, NaN without ground.
     """
 
     tau: Float[Array, " M"]
     states: FiniteState
     inflow: Float[Array, "K R"]
+    printed_inflow: Float[Array, "K R"]
     exact_image_inflow: Float[Array, "K R"]
     dct_dr: Float[Array, "K R"]
     inflow_grid: Float[Array, "72 64"]
     dct_dr_grid: Float[Array, "72 64"]
+    printed_diameter: Float[Array, "2 64"]
     exact_image_diameter: Float[Array, "2 64"]
     mean_inflow: Float[Array, ""]
+    printed_mean_inflow: Float[Array, ""]
     exact_image_mean_inflow: Float[Array, ""]
     ground_normal_velocity_rms: Float[Array, ""]
+    printed_ground_normal_velocity_rms: Float[Array, ""]
 
 
-def model_of(case: Case, settings: StudySettings) -> FiniteStateModel:
-    """The VPBFSM of a case. Level ground has the slope's harmonics too: zero there, they share the compilation."""
+def model_of(case: Case, settings: StudySettings, printed: bool = False) -> FiniteStateModel:
+    """The VPBFSM of a case, or the paper's own.
+
+    Level ground has the slope's harmonics too: zero there, they share the compilation. Sources have as many terms as
+    degrees up to 15 leave.
+    """
     return finite_state_model(
         case.ground,
         harmonics=settings.harmonics,
         radial_terms=settings.radial_terms,
         ground_harmonics=settings.harmonics,
-        ground_radial_terms=settings.source_terms,
+        ground_radial_terms=min(settings.source_terms, (14 - settings.harmonics) // 2 + 1),
+        printed=printed,
     )
+
+
+def models_of(case: Case, settings: StudySettings) -> tuple[FiniteStateModel, FiniteStateModel]:
+    """The default model of a case, and the paper's own."""
+    return model_of(case, settings), model_of(case, settings, printed=True)
 
 
 def from_loads(case: Case, settings: StudySettings, dct_dr: np.ndarray, stations: Stations) -> FiniteStateResult:
@@ -84,145 +88,77 @@ def from_loads(case: Case, settings: StudySettings, dct_dr: np.ndarray, stations
     Raises InputError where the loading holds numbers that are not finite, does not thrust upward, or has too few
     azimuths for the harmonics.
     """
-    model = model_of(case, settings)
+    models = models_of(case, settings)
+    model = models[0]
     loads = jnp.broadcast_to(jnp.asarray(dct_dr, float), (stations.psi.size, stations.r.size))
     if not bool(jnp.all(jnp.isfinite(loads))):
         raise InputError("Argument `dct_dr` must be finite throughout, but is not")
-    tau = _pressure(loads, stations, model)
+    tau = pressure(loads, stations, model)
     thrust = float(loading.thrust_coefficient(tau, model.modes))
     if thrust <= 0:
         raise InputError(f"Argument `dct_dr` must carry a positive thrust, but its C_T is {thrust:.3g}")
-    return evaluate(model, tau, stations, jnp.asarray(settings.climb_ratio))
+    return evaluate(models, tau, stations, jnp.asarray(settings.climb_ratio))
 
 
 def of_pressure(case: Case, settings: StudySettings, tau: np.ndarray, stations: Stations) -> FiniteStateResult:
     """The VPBFSM of given pressure coefficients (M,) with positive thrust."""
-    return evaluate(model_of(case, settings), jnp.asarray(tau), stations, jnp.asarray(settings.climb_ratio))
-
-
-def steady_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
-    """States in steady climb over ΩR: a = V̂⁻¹τ, c = G a; Eq. 3 where the climb is zero.
-
-    Climb adds V_c to both mass-flow parameters, V_c + v and V_c + 2v with v the induced velocity of momentum theory
-    (the axial case of V_T = λ and V̄ = λ + λ_i); v = √(C_T/2) in hover. With one pressure term the mean inflow is v.
-    """
-    hover = jnp.sqrt(loading.thrust_coefficient(tau, model.modes) / 2)
-    induced = jnp.sqrt(hover**2 + climb**2 / 4) - climb / 2
-    a = tau / (mass_flow_parameters(model, tau) * induced / hover + climb)
-    if model.ground is None:
-        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    return FiniteState(a, correlation(model.modes, model.sources, model.ground, model.quadrature) @ a)
-
-
-def axial_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
-    """Steady states in any axial flight that momentum theory knows; a thrust down is one up, upside down.
-
-    In the windmill brake state, out of ground effect, the air goes up with V_T = −(V_c + v) and V̄ = −(V_c + 2v); else
-    `steady_state`. Its mass flows in hover, V and 2V, tell which of the two carries a mode.
-    """
-    thrust = loading.thrust_coefficient(tau, model.modes)
-    sign = jnp.where(thrust < 0, -1.0, 1.0)
-    tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
-    windmill = climb <= VORTEX_RING[0] * hover
-    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb))
-    if model.ground is None:
-        inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
-        through, varying = inner - climb / 2, 2 * inner
-        first = mass_flow_parameters(model, tau) < 1.5 * hover
-        braked = tau / jnp.where(first, through, varying)
-        state = FiniteState(jnp.where(windmill, braked, state.a), state.c)
-    return FiniteState(sign * state.a, sign * state.c)
+    return evaluate(models_of(case, settings), jnp.asarray(tau), stations, jnp.asarray(settings.climb_ratio))
 
 
 @eqx.filter_jit
 def evaluate(
-    model: FiniteStateModel, tau: Float[Array, " M"], stations: Stations, climb: Float[Array, ""]
+    models: tuple[FiniteStateModel, FiniteStateModel],
+    tau: Float[Array, " M"],
+    stations: Stations,
+    climb: Float[Array, ""],
 ) -> FiniteStateResult:
-    """Steady states of a loading and all fields of `FiniteStateResult`."""
-    state = axial_state(model, tau, climb)
+    """Steady states of a loading and all fields of `FiniteStateResult`; models: as `models_of` returns them."""
+    model, printed = models
+    state, printed_state = axial_state(model, tau, climb), axial_state(printed, tau, climb)
     x, y, nu, weights = (jnp.asarray(v, tau.dtype) for v in model.quadrature.rule())
     area = 2 * nu * weights  # r dr = −ν dν
     grid_r, grid_psi, sides = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI, DIAMETER_PSI))
     at_stations, on_grid, across = _polar(stations.r, stations.psi), _polar(grid_r, grid_psi), _polar(grid_r, sides)
 
-    paper = _at_once(lambda x, y: disk_inflow(state, x, y, model), at_stations, on_grid, (x, y))
+    ours = _at_once(lambda x, y: disk_inflow(state, x, y, model), at_stations, on_grid)
+    paper = _at_once(lambda x, y: disk_inflow(printed_state, x, y, printed), at_stations, across)
+    printed_mean = mean_inflow(printed_state, printed)
     if model.ground is None:
-        exact = paper[0], _at_once(lambda x, y: disk_inflow(state, x, y, model), across)[0], paper[2]
-        left = jnp.asarray(jnp.nan, tau.dtype)
+        exact, left = [*paper, None], [jnp.asarray(jnp.nan, tau.dtype)] * 2
     else:
         exact = _at_once(
-            lambda x, y: rigid_cylinder.disk_inflow(state, x, y, model, PATCH), at_stations, across, (x, y)
+            lambda x, y: rigid_cylinder.disk_inflow(printed_state, x, y, printed, PATCH), at_stations, across, (x, y)
         )
-        left = ground_normal_velocity_rms(state, model)
+        left = [ground_normal_velocity_rms(*pair) for pair in ((state, model), (printed_state, printed))]
     return FiniteStateResult(
         tau=tau,
         states=state,
-        inflow=paper[0],
+        inflow=ours[0],
+        printed_inflow=paper[0],
         exact_image_inflow=exact[0],
         dct_dr=loading.distribution(tau, stations.r, stations.psi, model.modes),
-        inflow_grid=paper[1],
+        inflow_grid=ours[1],
         dct_dr_grid=loading.distribution(tau, grid_r, grid_psi, model.modes),
+        printed_diameter=paper[1],
         exact_image_diameter=exact[1],
-        mean_inflow=area @ paper[2],
-        exact_image_mean_inflow=area @ exact[2],
-        ground_normal_velocity_rms=left,
+        mean_inflow=mean_inflow(state, model),
+        printed_mean_inflow=printed_mean,
+        exact_image_mean_inflow=printed_mean if exact[2] is None else area @ exact[2],
+        ground_normal_velocity_rms=left[0],
+        printed_ground_normal_velocity_rms=left[1],
     )
 
 
-def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, RotorCoefficients, Stations]:
-    """The VPBFSM with the blade-element loads of its own inflow: the pressure terms that reproduce themselves.
+def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Balance]:
+    """The VPBFSM with the blade-element loads of its own inflow (`inflow.balance`), and the rotor's coefficients.
 
-    Returns also the rotor's coefficients and the stations. No tip loss beyond what the expansion has. Raises InputError
-    where no such loading is found.
+    Raises InputError where no such loading is found, or the flight is beyond the model.
     """
-    edges = np.linspace(float(settings.rotor.root_cutout), 1.0, ALONE_PANELS + 1)
-    stations = Stations(
-        jnp.asarray(0.5 * (edges[1:] + edges[:-1])),
-        jnp.asarray(np.diff(edges)),
-        jnp.asarray(2 * np.pi / ALONE_AZIMUTHS * np.arange(ALONE_AZIMUTHS)),
-    )
-    model = model_of(case, settings)
+    models = models_of(case, settings)
     guess = check_axial("vpbfsm", settings.rotor, settings.operating)
-    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * guess)
-    tau, converged, total = _self_consistent(start, model, settings.rotor, settings.operating, stations)
-    thrust = float(loading.thrust_coefficient(tau, model.modes))
-    if not (bool(converged) and thrust * guess > 0):
-        raise InputError(
-            f"Argument `collective` must give a loading that thrusts upward, but at {settings.collective_deg:g} deg "
-            f"no steady one was found (residual tolerance {_tolerance(tau.dtype):.0e})"
-        )
-    check_flight("vpbfsm", thrust, settings.climb_ratio)
-    return evaluate(model, tau, stations, jnp.asarray(settings.climb_ratio)), total, stations
-
-
-@eqx.filter_jit
-def _self_consistent(start, model, rotor, operating, stations):
-    climb = operating.climb_ratio(rotor.radius)
-
-    def blade(tau) -> SectionLoads:
-        x, y = _polar(stations.r, stations.psi)
-        down = disk_inflow(axial_state(model, tau, climb), x, y, model) + climb
-        return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
-
-    def residual(tau, _):
-        return _pressure(disk_loading(rotor, blade(tau)), stations, model) - tau
-
-    import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
-
-    rtol = _tolerance(start.dtype)
-    found = optx.root_find(residual, optx.Newton(rtol=rtol, atol=rtol / 100), start, max_steps=50, throw=False)
-    total = coefficients_of(rotor, blade(found.value), stations.r, stations.widths)
-    return found.value, found.result == optx.RESULTS.successful, total
-
-
-def _tolerance(dtype: Any) -> float:
-    """Relative change of the pressure terms at which they count as found: 1e-10, or single precision's rounding."""
-    return 1e-10 if jnp.finfo(dtype).bits == 64 else 2e-5
-
-
-@eqx.filter_jit
-def _pressure(dct_dr, stations: Stations, model: FiniteStateModel):
-    return loading.from_distribution(dct_dr, stations.r, stations.widths, stations.psi, model.modes)
+    found = balance(models[0], settings.rotor, settings.operating, stations_of(settings.rotor), guess)
+    check_flight("vpbfsm", float(found.CT), settings.climb_ratio)
+    return evaluate(models, found.tau, found.stations, jnp.asarray(settings.climb_ratio)), found
 
 
 def _polar(r: Array, psi: Array) -> tuple[Array, Array]:

@@ -19,11 +19,12 @@ from matplotlib.figure import Figure
 from rotorjax.bench.azimuth import refine_azimuth
 from rotorjax.io.atomic import write_bytes
 
-FREE_WAKE, VPBFSM, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#009E73", "#222222"
+FREE_WAKE, VPBFSM, PRINTED, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#E69F00", "#009E73", "#222222"
 MODEL_STYLE: dict[str, dict[str, Any]] = {
     "free_wake": {"color": FREE_WAKE, "linestyle": "-", "marker": "o", "label": "free wake"},
-    "vpbfsm": {"color": VPBFSM, "linestyle": "--", "label": "VPBFSM, printed factor"},
-    "exact_image": {"color": EXACT_IMAGE, "linestyle": ":", "label": "VPBFSM, exact image"},
+    "vpbfsm": {"color": VPBFSM, "linestyle": "--", "label": "VPBFSM"},
+    "printed": {"color": PRINTED, "linestyle": "-.", "label": "VPBFSM, as printed"},
+    "exact_image": {"color": EXACT_IMAGE, "linestyle": ":", "label": "cylinder, exact image"},
 }
 STYLE = {
     "figure.dpi": 100,

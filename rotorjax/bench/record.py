@@ -18,25 +18,36 @@ COMPARED = (0.25, 0.95)  # radii over R between which the distributions are comp
 # name in the data set: (attribute of the result, dimensions, description)
 FIELDS: dict[str, tuple[str, tuple[str, ...], str]] = {
     "vpbfsm_tau": ("tau", ("mode",), "VPBFSM: pressure coefficients τ (Eq. 2)"),
-    "vpbfsm_inflow": ("inflow", ("station_azimuth", "radius"), "VPBFSM, printed factor: inflow over ΩR, positive down"),
+    "vpbfsm_inflow": ("inflow", ("station_azimuth", "radius"), "VPBFSM: inflow over ΩR, positive down"),
+    "printed_inflow": (
+        "printed_inflow",
+        ("station_azimuth", "radius"),
+        "VPBFSM as printed in the paper: inflow over ΩR, positive down",
+    ),
     "exact_image_inflow": (
         "exact_image_inflow",
         ("station_azimuth", "radius"),
-        "VPBFSM over the exact image of its wake: inflow over ΩR, positive down",
+        "VPBFSM as printed, over the exact image of its wake: inflow over ΩR, positive down",
     ),
     "vpbfsm_dct_dr": ("dct_dr", ("station_azimuth", "radius"), "loading of the pressure terms: dC_T/d(r/R)"),
     "vpbfsm_inflow_grid": (
         "inflow_grid",
         ("grid_azimuth", "grid_radius"),
-        "VPBFSM, printed factor: inflow over ΩR on a grid",
+        "VPBFSM: inflow over ΩR on a grid",
     ),
     "vpbfsm_dct_dr_grid": ("dct_dr_grid", ("grid_azimuth", "grid_radius"), "loading of the pressure terms on a grid"),
+    "printed_inflow_diameter": (
+        "printed_diameter",
+        ("side", "grid_radius"),
+        "VPBFSM as printed: inflow over ΩR on the mountain (0) and valley (1) side",
+    ),
     "exact_image_inflow_diameter": (
         "exact_image_diameter",
         ("side", "grid_radius"),
         "VPBFSM over the exact image: inflow over ΩR on the mountain (0) and valley (1) side",
     ),
-    "vpbfsm_mean_inflow": ("mean_inflow", (), "VPBFSM, printed factor: area-weighted mean inflow over ΩR"),
+    "vpbfsm_mean_inflow": ("mean_inflow", (), "VPBFSM: area-weighted mean inflow over ΩR"),
+    "printed_mean_inflow": ("printed_mean_inflow", (), "VPBFSM as printed: area-weighted mean inflow over ΩR"),
     "exact_image_mean_inflow": (
         "exact_image_mean_inflow",
         (),
@@ -47,7 +58,14 @@ FIELDS: dict[str, tuple[str, tuple[str, ...], str]] = {
         (),
         "VPBFSM: rms normal velocity left on the ground inside the wake radius over that of the incoming flow",
     ),
+    "printed_ground_normal_velocity_rms": (
+        "printed_ground_normal_velocity_rms",
+        (),
+        "VPBFSM as printed: rms normal velocity left on the ground inside the wake radius over that of the incoming "
+        "flow",
+    ),
 }
+MODELS = {"printed": "printed", "default": "vpbfsm"}  # in summary.json: name of the variables in the data set
 
 
 def stations_of(data: xr.Dataset, settings: StudySettings) -> Stations:
@@ -100,7 +118,7 @@ def rms_difference(
 
 
 def inflow_rms_difference(data: xr.Dataset, reference: float, model: str = "vpbfsm") -> float | None:
-    """Rms difference of a model's inflow ("vpbfsm" or "exact_image") and the free wake's, both over `reference`."""
+    """Rms difference of a model's inflow ("vpbfsm", "printed", …) and the free wake's, both over `reference`."""
     if f"{model}_inflow" not in data or "free_wake_inflow" not in data:
         return None
     ours, theirs = data[f"{model}_inflow"].to_numpy(), data["free_wake_inflow"].to_numpy()
@@ -117,10 +135,22 @@ def summary_entry(data: xr.Dataset, reference: float | None) -> dict[str, Any]:
         "slope_deg": case.slope_deg,
         "free_wake": _free_wake_entry(data) if "free_wake_inflow" in data else None,
         "vpbfsm": _finite_state_entry(data) if "vpbfsm_inflow" in data else None,
+        "finite_state": _models_entry(data, reference) if "vpbfsm_inflow" in data else None,
         "inflow_rms_difference": None if reference is None else inflow_rms_difference(data, reference),
         "wall_time_s": float(data["wall_time_s"]),
         "compile_time_s": float(data["compile_time_s"]),
         **({"flapping": _flapping_entry(data)} if "flap" in data else {}),
+    }
+
+
+def _models_entry(data: xr.Dataset, reference: float | None) -> dict[str, dict[str, float | None]]:
+    return {
+        title: {
+            "mean_inflow": float(data[f"{name}_mean_inflow"]),
+            "inflow_rms_difference": None if reference is None else inflow_rms_difference(data, reference, name),
+            "ground_normal_velocity_rms": float(data[f"{name}_ground_normal_velocity_rms"]),
+        }
+        for title, name in MODELS.items()
     }
 
 
@@ -131,12 +161,13 @@ def _flapping_entry(data: xr.Dataset) -> dict[str, Any]:
 
 def _free_wake_entry(data: xr.Dataset) -> dict[str, Any]:
     return {
-        **_loads_entry(data),
+        **_numbers(data, "CT", "CP_induced"),
         "mean_inflow": float(data["free_wake_mean_inflow"]),
         "residual": float(data["free_wake_residual"]),
         "converged": bool(data["converged"]),
-        "lost_at": lost_at(data),
         "ground_normal_velocity_rms": float(data["free_wake_ground_normal_velocity_rms"]),
+        **_numbers(data, "CP", "CP_profile"),
+        "lost_at": lost_at(data),
     }
 
 
@@ -146,9 +177,9 @@ def _finite_state_entry(data: xr.Dataset) -> dict[str, Any]:
         "ground_normal_velocity_rms": float(data["vpbfsm_ground_normal_velocity_rms"]),
     }
     if "free_wake_inflow" not in data:  # its own blade loads: what the free wake's entry holds otherwise
-        entry |= _loads_entry(data)
+        entry |= _numbers(data, "CT", "CP_induced", "CP", "CP_profile")
     return entry
 
 
-def _loads_entry(data: xr.Dataset) -> dict[str, float]:
-    return {name: float(data[name]) for name in ("CT", "CP", "CP_induced", "CP_profile")}
+def _numbers(data: xr.Dataset, *names: str) -> dict[str, float]:
+    return {name: float(data[name]) for name in names}

@@ -14,6 +14,7 @@ from rotorjax import __version__
 from rotorjax.checks import check_number
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
+from rotorjax.potential.model import choices, finite_state_model
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, quick_settings, wake_settings
@@ -61,6 +62,7 @@ class StudySettings:
             "vpbfsm.radial_terms": self.radial_terms,
             "vpbfsm.harmonics": self.harmonics,
             "vpbfsm.source_terms": self.source_terms,
+            **{f"vpbfsm.{name}": _plain(value) for name, value in choices(finite_state_model()).items()},
             **wake,
         }
 

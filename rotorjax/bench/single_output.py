@@ -70,8 +70,9 @@ def _numbers(data: xr.Dataset, reference: float | None) -> list[tuple[str, str]]
         "CP": "C_P = P/(ρA(ΩR)³)",
         "CP_induced": "C_P, induced",
         "free_wake_mean_inflow": "mean inflow/ΩR, free wake",
-        "vpbfsm_mean_inflow": "mean inflow/ΩR, VPBFSM, printed factor",
-        "exact_image_mean_inflow": "mean inflow/ΩR, VPBFSM, exact image",
+        "vpbfsm_mean_inflow": "mean inflow/ΩR, VPBFSM",
+        "printed_mean_inflow": "mean inflow/ΩR, VPBFSM as printed",
+        "exact_image_mean_inflow": "mean inflow/ΩR, cylinder, exact image",
         "free_wake_residual": "free wake: residual/R",
         "free_wake_ground_normal_velocity_rms": "free wake: flow through the ground",
         "vpbfsm_ground_normal_velocity_rms": "VPBFSM: flow through the ground",
@@ -83,7 +84,7 @@ def _numbers(data: xr.Dataset, reference: float | None) -> list[tuple[str, str]]
     if "converged" in data:
         rows.append(("free wake", "converged" if bool(data["converged"]) else f"NOT CONVERGED: {data.attrs['why']}"))
     if reference:
-        for model, title in (("vpbfsm", "printed factor"), ("exact_image", "exact image")):
+        for model, title in (("vpbfsm", "VPBFSM"), ("printed", "as printed"), ("exact_image", "exact image")):
             value = inflow_rms_difference(data, reference, model)
             if value is not None:
                 rows.append((f"rms difference of the inflow, {title}", f"{value:.4f}"))

@@ -2,13 +2,13 @@
 
 [calibration]
 set = "hayden"             # or "freewake", "wake": which parameters there are and what they mean
-model_version = 1
+model_version = 2
 rotorjax = "0.1.0"
 converged = true
 rms_error = 0.00355
 [parameters]
-b = 0.0917
-p = 1.276
+radius = 0.7
+clearance = 0.6
 [fitted_with]
 loading = "elliptic"
 """
@@ -19,21 +19,19 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax import __version__
-from rotorjax.bench.finite_state import steady_state
 from rotorjax.calibration import hayden, measured, taught
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.checks import Range, shown
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_text
 from rotorjax.io.toml_file import OTHERS, Key, Schema, Tables, read_toml, value_of
-from rotorjax.potential.model import FiniteState, FiniteStateModel
+from rotorjax.potential.model import FiniteState, FiniteStateModel, steady_state
 
-MODEL_VERSION = 1  # raised when the finite-state equations change so that fitted values no longer mean the same
+MODEL_VERSION = 2  # raised when the finite-state equations change so that fitted values no longer mean the same
 SETS: dict[str, ParameterSet] = {s.name: s for s in (hayden.PARAMETERS, taught.PARAMETERS, measured.PARAMETERS)}
 _COUNT = Key("whole number", Range(1, 1000))
 SCHEMA: Schema = {
@@ -90,7 +88,7 @@ class Calibration:
                 "`rotorjax inflow` and `rotorjax study` solve the free wake with it"
             )
         if self.set == "hayden":
-            model = eqx.tree_at(lambda m: (m.correction.b, m.correction.p), model, tuple(self.values))
+            model = hayden.with_wake(model, self.values)
             return model, steady_state(model, tau, jnp.asarray(climb, float))
         for name, ours in {"radial_terms": _radial_terms(model), "source_terms": _source_terms(model)}.items():
             if (theirs := self.fitted_with.get(name, ours)) != ours:

@@ -40,8 +40,8 @@ def hayden_figure(result: HaydenRun, path: str | Path) -> None:
         left.plot(fine, hayden_factor(jnp.asarray(fine)), color=INK, label="Hayden")
         h = np.asarray(result.data.heights)
         order = np.argsort(h)
-        b, p = result.all_values
-        fitted = f"VPBFSM, fitted: b = {b:.3f}, p = {p:.2f}"
+        radius, clearance = result.all_values
+        fitted = f"VPBFSM, fitted: radius {radius:.3f}, clearance {clearance:.2f}"
         left.plot(h[order], result.ratios()[order], "o", color=CALIBRATED, label=fitted, markersize=6)
         printed = MODEL_STYLE["vpbfsm"] | {"marker": "s"}
         left.plot(h[order], result.ratios(printed=True)[order], **printed)
@@ -56,7 +56,7 @@ def hayden_figure(result: HaydenRun, path: str | Path) -> None:
 
 
 def case_figure(result: FreeWakeRun, name: str, path: str | Path) -> None:
-    """Inflow of one case across the diameter: free wake, printed factor, calibrated."""
+    """Inflow of one case across the diameter: free wake, default, calibrated."""
     with style():
         figure = new_figure(6.0, 4.2)
         draw_case(figure.add_subplot(), result, name)
@@ -89,7 +89,7 @@ def rms_figure(result: FreeWakeRun, path: str | Path) -> None:
         figure = new_figure(9.0, 4.2)
         axes = figure.add_subplot()
         place = np.arange(len(result.data.names))
-        axes.bar(place - 0.2, result.printed, 0.4, color=MODEL_STYLE["vpbfsm"]["color"], label="printed factor")
+        axes.bar(place - 0.2, result.printed, 0.4, color=MODEL_STYLE["vpbfsm"]["color"], label="default")
         axes.bar(place + 0.2, result.taught, 0.4, color=CALIBRATED, label="calibrated")
         labels = [label(result, n) + (" *" if n in result.held else "") for n in result.data.names]
         axes.set_xticks(place, labels, rotation=45, ha="right", rotation_mode="anchor")

@@ -50,7 +50,7 @@ class FreeWakeRun:
 
     @property
     def halved(self) -> bool:
-        """Whether the mean rms difference over the held-out cases is at most half of the printed factor's."""
+        """Whether the mean rms difference over the held-out cases is at most half of the default's."""
         return self.mean(self.taught, True) <= HALVED * self.mean(self.printed, True)
 
 
@@ -137,7 +137,7 @@ def report(result: FreeWakeRun) -> str:
         f"{n:<14}{v:9.4f} ± {d:.4f}   (printed {p:.4f})"
         for n, v, d, p in zip(fit.parameters.names, fit.values, fit.deviations, fit.parameters.printed, strict=True)
     ]
-    lines += ["", f"{'rms difference of the inflow':<32}{'printed factor':>16}{'calibrated':>12}"]
+    lines += ["", f"{'rms difference of the inflow':<32}{'default':>16}{'calibrated':>12}"]
     for name, before, after in zip(result.data.names, result.printed, result.taught, strict=True):
         lines.append(f"{name + (' (held out)' if name in result.held else ''):<32}{before:16.4f}{after:12.4f}")
     for held, title in ((False, "mean of the taught cases"), (True, "mean of the held-out cases")):

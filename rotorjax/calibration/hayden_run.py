@@ -50,24 +50,24 @@ class HaydenRun:
         return max(float(np.max(np.abs(f.values - self.fit.values))) for f in self.fits.values())
 
     def ratios(self, printed: bool = False) -> np.ndarray:
-        """Inflow ratio at each height, fitted or with the printed factor, (H,)."""
+        """Inflow ratio at each height, fitted or with the default wake, (H,)."""
         values = hayden.PARAMETERS.printed if printed else self.all_values
         return np.asarray(hayden.inflow_ratio(self.data, *(jnp.asarray(v) for v in values)))
 
     @property
     def all_values(self) -> np.ndarray:
-        """b and p, fitted or fixed."""
+        """Radius and clearance, fitted or fixed."""
         return np.asarray(hayden.PARAMETERS.complete(jnp.asarray(self.fit.values), self.data.free, self.data.fixed))
 
     @property
     def printed_rms(self) -> float:
-        """Rms of the printed factor."""
+        """Rms of the default wake."""
         return float(np.sqrt(np.mean((self.ratios(printed=True) - np.asarray(self.data.targets)) ** 2)))
 
 
 def run(
     heights: Sequence[float] = hayden.HEIGHTS,
-    parameters: Sequence[str] = ("b", "p"),
+    parameters: Sequence[str] = hayden.PARAMETERS.names,
     loading: hayden.Loading = "elliptic",
     tau: tuple[np.ndarray, np.ndarray] | None = None,
     progress: Progress | None = None,
@@ -107,13 +107,12 @@ def record(result: HaydenRun) -> dict[str, Any]:
     """Content of calibration.json."""
     fit = result.fit
     return fit_entry(fit, "hayden", result.printed_rms) | {
-        "b": float(result.all_values[0]),
-        "p": float(result.all_values[1]),
+        **hayden.PARAMETERS.table(result.all_values),
         "loading": result.loading,
         "heights": result.data.heights,
         "targets": result.data.targets,
         "inflow_ratio": result.ratios(),
-        "inflow_ratio_printed_factor": result.ratios(printed=True),
+        "inflow_ratio_default": result.ratios(printed=True),
         "drivers": {n: {"parameters": f.parameters.table(f.values), "rms_error": f.rms, "converged": f.converged}
                     for n, f in result.fits.items()},
         "largest_difference_of_drivers": result.disagreement,
@@ -136,8 +135,8 @@ def report(result: HaydenRun) -> str:
     fit, deviations = result.fit, result.fit.deviations
     lines = [f"Hayden's factor at constant thrust, {len(result.data.heights)} heights, loading: {result.loading}", ""]
     for name, value, deviation in zip(fit.parameters.names, fit.values, deviations, strict=True):
-        lines.append(f"{name:<8}{value:.6f}" + (f" ± {deviation:.6f}" if np.isfinite(deviation) else ""))
-    lines += ["", f"{'h/R':>6}{'Hayden':>10}{'fitted':>10}{'printed factor':>16}"]
+        lines.append(f"{name:<12}{value:.6f}" + (f" ± {deviation:.6f}" if np.isfinite(deviation) else ""))
+    lines += ["", f"{'h/R':>6}{'Hayden':>10}{'fitted':>10}{'default':>16}"]
     rows = zip(result.data.heights, result.data.targets, result.ratios(), result.ratios(printed=True), strict=True)
     lines += [f"{h:6.2f}{t:10.4f}{ours:10.4f}{theirs:16.4f}" for h, t, ours, theirs in rows]
     lines += [

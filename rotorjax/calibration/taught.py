@@ -1,51 +1,46 @@
-"""The finite-state model with six physically named corrections; at their printed values it is the published model.
+"""The finite-state model with six physically named corrections; at their printed values it is the default model.
 
-What they stand for, and why these: driven by the free wake's loads, the published model misses the free wake in two
-ways. Out of ground effect the inflow's radial shape is off, because the wake contracts: the states' gains (what the
-influence matrix makes of each pressure term) answer for that. Near the ground the r = j sources act much too far up,
-and the ground acts at the centre of the disk rather than at its edge, where the free wake turns outward before it
-stagnates: the reach of the r = j sources and the gain of the others answer for that. On a slope the free wake runs
-downhill, and its inflow tilts less than a column that stays under the rotor: the share of the slope that the sources
-see answers for that.
+What they stand for: how far the wake contracts (radius), how fast (length) and how near the ground keeps it from that
+(clearance); what the influence matrix makes of the mean and of the third pressure term (gains, within half of their
+values); and the share of a slope that the sources see, since the free wake runs downhill, and its inflow tilts less
+than that of a column that stays under the rotor.
 
-The price: a gain on the sources gives up the flow condition on the ground that they were solved for. The corrections
-are for the inflow at the disk, not for the flow field at the ground.
+The corrections keep what the sources are solved for: no flow through the ground that they see.
 """
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.calibration.parameters import Parameter, ParameterSet
 from rotorjax.ground import Plane
-from rotorjax.potential.loading import thrust_coefficient
-from rotorjax.potential.model import FiniteState, FiniteStateModel, ground_matrix, mass_flow_parameters
-
-SHARPNESS = 2.0  # exponent of η, the paper's
-PRINTED_REACH = float((-np.log(np.pi / 7)) ** (-1 / SHARPNESS))  # where (π/7)^(η²) has fallen to 1/e
+from rotorjax.potential.contraction import CLEARANCE, LENGTH, MOMENTUM, Contraction
+from rotorjax.potential.model import FiniteState, FiniteStateModel, mass_flow_parameters, with_ground
 
 PARAMETERS = ParameterSet(
     "freewake",
     (
-        Parameter("mean_gain", 0.2, 3.0, 1.0, "factor on the axisymmetric state n = 1 (mean inflow)"),
-        Parameter("third_gain", -1.0, 4.0, 1.0, "factor on the axisymmetric state n = 3"),
-        Parameter("fifth_gain", -4.0, 4.0, 1.0, "factor on the axisymmetric states n >= 5"),
-        Parameter("reach", 0.05, 4.0, PRINTED_REACH, "height eta at which the r = j sources have fallen to 1/e"),
-        Parameter("source_gain", 0.0, 10.0, 1.0, "factor on the ground sources other than r = j"),
-        Parameter("slope_share", -1.0, 2.0, 1.0, "tangent of the slope that the sources see, over that of the ground"),
+        Parameter("radius", 0.5, 1.0, MOMENTUM, "radius of the contracted wake far below, over R"),
+        Parameter("length", 0.02, 1.0, LENGTH, "depth in which most of the contraction is done, over R"),
+        Parameter("clearance", 0.02, 4.0, CLEARANCE, "height over ground at which it contracts half as much, over R"),
+        Parameter("mean_gain", 0.5, 1.5, 1.0, "factor on the axisymmetric state n = 1 (mean inflow)"),
+        Parameter("third_gain", 0.5, 1.5, 1.0, "factor on the axisymmetric state n = 3"),
+        Parameter("slope_share", 0.0, 1.5, 1.0, "tangent of the slope that the sources see, over that of the ground"),
     ),
 )
 
 
+def _value(values: Float[Array, " P"], name: str) -> Float[Array, ""]:
+    return values[PARAMETERS.names.index(name)]
+
+
 def taught_model(model: FiniteStateModel, values: Float[Array, " P"]) -> FiniteStateModel:
-    """Return the model with the reach and the slope of `values` (in the order of PARAMETERS)."""
-    reach, share = (values[PARAMETERS.names.index(n)] for n in ("reach", "slope_share"))
-    base = jnp.exp(-(reach**-SHARPNESS))
-    model = eqx.tree_at(lambda m: (m.correction.b, m.correction.p), model, (base, jnp.asarray(SHARPNESS)))
+    """Return the model with the wake and the slope of `values` (in the order of PARAMETERS)."""
+    wake = Contraction(*(_value(values, name) for name in ("radius", "length", "clearance")))
+    model = eqx.tree_at(lambda m: m.wake, model, wake, is_leaf=lambda w: w is None)
     if model.ground is None:
         return model
-    seen = Plane(model.ground.height, jnp.arctan(share * jnp.tan(model.ground.slope)))
+    seen = Plane(model.ground.height, jnp.arctan(_value(values, "slope_share") * jnp.tan(model.ground.slope)))
     return eqx.tree_at(lambda m: m.ground, model, seen)
 
 
@@ -54,18 +49,9 @@ def taught_state(
 ) -> FiniteState:
     """Return the steady states of a loading, corrected; model: as `taught_model` returns it.
 
-    tau (M,): pressure coefficients with positive thrust; climb: over ΩR, added to both mass-flow parameters.
+    tau (M,): pressure coefficients; climb: over ΩR.
     """
-    mean, third, fifth, source = (
-        values[PARAMETERS.names.index(n)] for n in ("mean_gain", "third_gain", "fifth_gain", "source_gain")
-    )
-    modes = model.modes
-    gain = jnp.where(modes.n == 1, mean, jnp.where(modes.n == 3, third, fifth))
-    gain = jnp.where(modes.m == 0, gain, 1.0)
-    hover = jnp.sqrt(thrust_coefficient(tau, modes) / 2)
-    induced = jnp.sqrt(hover**2 + climb**2 / 4) - climb / 2
-    a = gain * tau / (mass_flow_parameters(model, tau) * induced / hover + climb)
-    if model.ground is None:
-        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    c = ground_matrix(model, model.ground) @ a
-    return FiniteState(a, c * jnp.where(model.sources.diagonal, 1.0, source))
+    n, axisymmetric = model.modes.n, model.modes.m == 0
+    gain = jnp.where(n == 1, _value(values, "mean_gain"), jnp.where(n == 3, _value(values, "third_gain"), 1.0))
+    a = jnp.where(axisymmetric, gain, 1.0) * tau / mass_flow_parameters(model, tau, climb)
+    return with_ground(a, model)

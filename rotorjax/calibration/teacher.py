@@ -4,6 +4,7 @@ The lessons are the cases of a finished study (`rotorjax study`, cases.nc), comp
 inflow and the pressure coefficients of its blade loads. Some cases are held out of the fit, for the verdict.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from json import loads
@@ -27,7 +28,7 @@ from rotorjax.io import netcdf
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import FiniteStateModel, disk_inflow, finite_state_model
 
-FAR = 30.0  # a stand-in height where there is no ground; its effect is masked
+FAR = 1e4  # a stand-in height where there is no ground; its effect is masked
 
 
 class Lessons(eqx.Module):
@@ -75,7 +76,7 @@ class Lessons(eqx.Module):
 def find_cases(path: str | Path) -> xr.Dataset:
     """Read cases.nc, or the one in a study's folder. Raises InputError where it is not there or not a study's."""
     path = Path(path)
-    merged = netcdf.read(path / "cases.nc" if path.is_dir() else path)
+    merged = netcdf.read(path / "cases.nc" if os.path.isdir(path) else path)
     needed = ("free_wake_inflow", "vpbfsm_tau", "reference_inflow", "converged", "height", "slope_deg", "panel_width")
     if lacking := [n for n in needed if n not in merged]:
         raise InputError(f"{path}: the file must be the cases.nc of a study, but lacks {lacking[0]}")

@@ -22,18 +22,20 @@ def register(commands: argparse._SubParsersAction) -> None:
         "1 where the fit did not converge or a parameter ended at a bound.",
     )
     targets = parser.add_subparsers(dest="target", metavar="TARGET", required=True, parser_class=type(parser))
-    hayden = targets.add_parser("hayden", help="factor b^(eta^p) against Hayden's k_G at constant thrust")
+    hayden = targets.add_parser("hayden", help="contraction of the wake against Hayden's k_G at constant thrust")
     hayden.add_argument("--heights", nargs="+", type=float, metavar="H", help="over R (0.5 0.75 1 1.5 2 3)")
-    hayden.add_argument("--parameters", default="b,p", metavar="NAMES", help="what to fit, by commas (b,p)")
+    hayden.add_argument(
+        "--parameters", default="radius,clearance", metavar="NAMES", help="what to fit, by commas (radius,clearance)"
+    )
     loads = hayden.add_mutually_exclusive_group()
     loads.add_argument("--loading", choices=LOADINGS, default="elliptic", help="given loading (elliptic)")
     loads.add_argument("--cases", type=Path, metavar="FILE", help="blade loads of a study: cases.nc or its folder")
-    hayden.set_defaults(run=run_hayden)
+    hayden.set_defaults(run=run_hayden, free_wake=lambda _: False)
     wake = targets.add_parser("freewake", help="six corrections against the free wake's inflow")
     wake.add_argument("--cases", required=True, type=Path, metavar="FILE", help="a study's cases.nc or its folder")
     wake.add_argument("--parameters", metavar="NAMES", help="what to fit, by commas (all)")
     wake.add_argument("--held", nargs="*", metavar="CASE", help="cases to hold out (every second height and slope)")
-    wake.set_defaults(run=run_freewake)
+    wake.set_defaults(run=run_freewake, free_wake=lambda _: False)  # a study has solved it
     own = targets.add_parser("wake", help="the free wake's own settings against Caradonna and Tung's rotor at 8 deg")
     own.add_argument("--parameters", metavar="NAMES", help="settings to fit, by commas (release)")
     own.add_argument("--fit", metavar="NAMES", help="of CT, lift, r, z, by commas; the others are held out (CT,z)")

@@ -5,17 +5,19 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax.deck.blades import Stations
+from rotorjax.potential.contraction import NODES
 from rotorjax.potential.field import disk_functions
+from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import disk_modes
-from rotorjax.potential.model import FiniteStateModel
-from rotorjax.potential.modes import ModeTable
+from rotorjax.potential.model import FiniteStateModel, rotor_flow
 
 
 class DiskMatrices(eqx.Module):
     """What is linear on the disk, tabulated once.
 
-    rotor_inflow (M, KR), ground_inflow (L, KR): inflow and upflow of unit states at the stations of the loads. pressure
-    (M, KR): from dC_T/dr̄ there to τ. rotor_harmonics (3, M), ground_harmonics (3, L): λ₀, λ₁c, λ₁s of unit states.
+    rotor_inflow (M, KR), ground_inflow (L, KR): inflow far from ground and upflow of unit states at the stations of the
+    loads. pressure (M, KR): from dC_T/dr̄ there to τ. rotor_harmonics (3, M), ground_harmonics (3, L): λ₀, λ₁c, λ₁s of
+    unit states.
     """
 
     rotor_inflow: Float[Array, "M KR"]
@@ -28,13 +30,15 @@ class DiskMatrices(eqx.Module):
 @eqx.filter_jit
 def disk_matrices(rotor: FiniteStateModel, at: Stations) -> DiskMatrices:
     """Tabulate them for a rotor's modes and stations."""
-    both = (rotor.modes, disk_modes(rotor))
-    inflow, harmonics = [at.functions(modes) for modes in both], [_harmonics(modes, rotor) for modes in both]
-    return DiskMatrices(inflow[0], inflow[1], at.pressure(rotor.modes), harmonics[0], harmonics[1])
-
-
-def _harmonics(modes: ModeTable, model: FiniteStateModel) -> Float[Array, "3 M"]:
-    """λ₀, λ₁c, λ₁s of unit states: area-weighted least squares over the disk."""
-    x, y, nu, weights = (jnp.asarray(v) for v in model.quadrature.rule())
-    area = 2 * nu * weights
-    return jnp.stack([area, 4 * area * x, 4 * area * y]) @ disk_functions(modes, x, y).T
+    fine = DiskQuadrature(NODES, rotor.quadrature.nodes_psi)
+    x, y, nu, weights = (jnp.asarray(v) for v in fine.rule())
+    area, modes = 2 * nu * weights, disk_modes(rotor)
+    harmonics = jnp.stack([area, 4 * area * x, 4 * area * y])  # λ₀, λ₁c, λ₁s by least squares over the disk's area
+    inflow = rotor_flow(rotor, None, *at.xy).reshape(len(rotor.modes), -1)
+    return DiskMatrices(
+        inflow,
+        at.functions(modes),
+        at.pressure(rotor.modes),
+        harmonics @ rotor_flow(rotor, None, x, y).T,
+        harmonics @ disk_functions(modes, x, y).T,
+    )

@@ -22,10 +22,10 @@ from rotorjax.deck.blades import Blades, Stations, stations
 from rotorjax.deck.disk_matrices import DiskMatrices, disk_matrices
 from rotorjax.deck.tip_path import TipPath, blades_at
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import RotorInputs, mass_flow, mean_induced_inflow, rate_table
+from rotorjax.potential.dynamics import RotorInputs, mass_flow, rate_table
 from rotorjax.potential.ground_table import GroundTable, disk_modes
 from rotorjax.potential.loading import thrust_coefficient
-from rotorjax.potential.model import FiniteStateModel
+from rotorjax.potential.model import FiniteStateModel, rotor_means
 from rotorjax.potential.moving_ground import GroundMotion, Variant, plane_velocity, require_variant
 from rotorjax.potential.wake_transport import WakeTransport
 
@@ -178,13 +178,21 @@ def _loads(
 def rhs(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGround) -> RotorState:
     """Return d(state)/dψ; t does not enter."""
     del t
-    tau, flap = _loads(state, ground_flow(state, now, model), now, model)
+    ground = ground_flow(state, now, model)
+    tau, flap = _loads(state, ground, now, model)
     inputs = RotorInputs(tau, now.mu, now.climb)
-    v = mass_flow(state.a, mean_induced_inflow(state.a, model.rotor), inputs, model.rotor)
+    v = mass_flow(state.a, _induced(state, ground, model), inputs, model.rotor)
     a = jnp.asarray(rate_table(model.rotor.modes), state.a.dtype) @ (tau - v * state.a)
     speed, transport = v[model.rotor.modes.index(0, 1)], model.transport
     wake = state.wake if transport is None else transport.rate(state.a, state.wake, speed)
     return RotorState(a, wake, state.flap_rate, flap)
+
+
+def _induced(state: RotorState, ground: Float[Array, " L"], model: OverGround) -> Float[Array, ""]:
+    """The mean flow through the disk that the mass flow is taken from."""
+    if not model.rotor.ground_in_mass_flow:
+        return rotor_means(model.rotor, None) @ state.a
+    return model.disk.rotor_harmonics[0] @ state.a - model.disk.ground_harmonics[0] @ ground
 
 
 def output(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGround) -> Output:

@@ -20,7 +20,7 @@ from rotorjax.potential.dynamics import hover_inputs
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import disk_modes, ground_table
-from rotorjax.potential.model import FiniteStateModel, finite_state_model
+from rotorjax.potential.model import FiniteStateModel, finite_state_model, rotor_flow
 from rotorjax.potential.moving_ground import GroundMotion, Variant, ground_states, residual
 from rotorjax.potential.wake_transport import WakeTransport, wake_transport
 from rotorjax.region import half_plane
@@ -36,9 +36,9 @@ GRID_R, GRID_PSI = np.linspace(0.0, 0.97, 24), 2 * np.pi / 36 * np.arange(36)
 
 
 def rotor_model(case: DeckCase) -> FiniteStateModel:
-    """The finite states of a case: odd sources and six harmonics under an edge, the paper's even ones otherwise."""
+    """The finite states of a case: six harmonics of sources under an edge, the rotor's own otherwise."""
     if case.edge is None:
-        terms = min(7, (15 - case.harmonics) // 2 + 1)  # enough to close a pitching deck to 3 %
+        terms = min(7, (14 - case.harmonics) // 2 + 1)  # enough to close a pitching deck to 3 %
         return finite_state_model(
             None, case.harmonics, case.radial_terms, case.harmonics, terms, quadrature=DiskQuadrature(20, 20)
         )
@@ -49,7 +49,6 @@ def rotor_model(case: DeckCase) -> FiniteStateModel:
         case.radial_terms,
         ground_harmonics=6,
         ground_radial_terms=5,
-        ground_parity="odd",
         quadrature=DiskQuadrature(20, 28),
         region=half_plane(0.0, azimuth),
     )
@@ -156,7 +155,8 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
     frames = np.unique(np.linspace(0, history.psi.size - 1, FRAMES).astype(int))
     x, y = GRID_R * np.cos(GRID_PSI)[:, None], GRID_R * np.sin(GRID_PSI)[:, None]
     rotor, out = model.rotor, history.outputs
-    own, answer = (disk_functions(m, jnp.asarray(x), jnp.asarray(y)) for m in (rotor.modes, disk_modes(rotor)))
+    x, y = jnp.asarray(x), jnp.asarray(y)
+    own, answer = rotor_flow(rotor, None, x, y), disk_functions(disk_modes(rotor), x, y)
     field = jnp.tensordot(history.states.a[frames], own, 1) - jnp.tensordot(out.ground[frames], answer, 1)
     left = _residuals(model, history, kept, frames)
     seconds = np.asarray(history.psi) / case.omega

@@ -7,6 +7,8 @@ that derivatives are right. Ground that a hub sees turned is handled likewise, b
 it has no derivative by roll.
 """
 
+from typing import Unpack
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -16,9 +18,19 @@ from rotorjax.ground import Plane, TurnedPlane
 from rotorjax.inflow.interface import DiskLoads, InflowModel
 from rotorjax.inflow.momentum import downward, edgewise, hover_inflow
 from rotorjax.potential import dynamics, loading
-from rotorjax.potential.model import FiniteState, FiniteStateModel, disk_inflow, finite_state_model
+from rotorjax.potential.ground_source import DiskQuadrature
+from rotorjax.potential.model import (
+    FiniteStateModel,
+    Settings,
+    answer_means,
+    disk_inflow,
+    finite_state_model,
+    with_ground,
+)
 from rotorjax.potential.modes import ModeTable
 from rotorjax.rotor.hub import RotorInputs
+
+STILL = 1e-12  # of a squared speed over ΩR: air at rest has a wake of hover, smoothly
 
 
 class FiniteStateInflow(InflowModel):
@@ -27,21 +39,23 @@ class FiniteStateInflow(InflowModel):
     model: FiniteStateModel
 
     def start(self, thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, " M"]:
-        """One pressure mode that carries the thrust, with momentum theory's mean inflow."""
-        first = self.model.modes.index(0, 1)
-        return jnp.zeros(len(self.model.modes)).at[first].set(jnp.sqrt(3.0) / 2 * hover_inflow(thrust, inputs))
+        """One pressure mode that carries the thrust, with momentum theory's mean inflow, less the ground's upflow."""
+        first, count = self.model.modes.index(0, 1), len(self.model.modes)
+        alone = jnp.zeros(count).at[first].set(jnp.sqrt(3.0) / 2 * hover_inflow(thrust, inputs))
+        over, _ = self._over(alone, inputs)
+        return alone / jnp.sqrt(1 - jnp.sqrt(3.0) / 2 * answer_means(over)[first])
 
     def velocity(
         self, state: Float[Array, " M"], points: Float[Array, "*n 3"], inputs: RotorInputs
     ) -> Float[Array, "*n 3"]:
         """Axial velocity of the disk, the ground's effect included."""
-        over, uphill = self._over(inputs)
+        over, uphill = self._over(state, inputs)
         x, y = points[..., 0], points[..., 1]
         if uphill is not None:
             cosine, sine = uphill
             state = _turn(self.model.modes, cosine, sine) @ state
             x, y = cosine * x + sine * y, cosine * y - sine * x
-        return downward(disk_inflow(dynamics.with_ground(state, over), x, y, over))
+        return downward(disk_inflow(with_ground(state, over), x, y, over))
 
     def rate(self, state: Float[Array, " M"], loads: DiskLoads, inputs: RotorInputs) -> Float[Array, " M"]:
         """Eq. 1 under the blades' pressure coefficients (Eq. 2)."""
@@ -54,37 +68,49 @@ class FiniteStateInflow(InflowModel):
         zero, one = jnp.zeros_like(speed), jnp.ones_like(speed)
         # along the wind, along y, and in no wind at all
         winds = jnp.stack([jnp.stack(w) for w in ((cosine, sine, speed), (zero, one, starboard), (one, zero, zero))])
-        along, across, none = jax.vmap(lambda wind: self._turned_rate(state, tau, wind, inputs.climb))(winds)
+        over, uphill = self._over(state, inputs)
+        rising = state if uphill is None else _turn(self.model.modes, uphill[0], uphill[1]) @ state
+        upflow = answer_means(over) @ rising
+
+        def turned(wind: Array) -> Array:
+            """Rate in a wind given by the cosine and sine of its direction, aft towards starboard, and its speed."""
+            turn = _turn(self.model.modes, wind[0], wind[1])
+            given = dynamics.RotorInputs(turn @ tau, wind[2], inputs.climb)
+            return turn.T @ dynamics.rotor_rate(turn @ state, given, over, upflow)
+
+        along, across, none = jax.vmap(turned)(winds)
         return jnp.where(rest, along + across - none, along)
 
-    def _turned_rate(
-        self, state: Float[Array, " M"], tau: Float[Array, " M"], wind: Float[Array, "3"], climb: Float[Array, ""]
-    ) -> Float[Array, " M"]:
-        """Rate in a wind given by the cosine and sine of its direction, aft towards starboard, and its speed."""
-        turn = _turn(self.model.modes, wind[0], wind[1])
-        alone = eqx.tree_at(lambda m: m.ground, self.model, None, is_leaf=lambda g: isinstance(g, Plane) or g is None)
-        start = FiniteState(turn @ state, jnp.zeros(len(self.model.sources), state.dtype))
-        rate = dynamics.rhs(jnp.zeros(()), start, dynamics.RotorInputs(turn @ tau, wind[2], climb), alone)
-        return turn.T @ rate.a
-
-    def _over(self, inputs: RotorInputs) -> tuple[FiniteStateModel, Float[Array, "2"] | None]:
-        """The model over the ground as the hub sees it, and the cosine and sine of the direction in which that rises;
-        None where it rises along x.
+    def _over(
+        self, state: Float[Array, " M"], inputs: RotorInputs
+    ) -> tuple[FiniteStateModel, Float[Array, "2"] | None]:
+        """The model over the ground as the hub sees it, its wake as the wind leaves it, and the cosine and sine of the
+        direction in which the ground rises; None where it rises along x.
         """
-        if self.model.ground is None or inputs.height is None:
-            return self.model, None
-        over = eqx.tree_at(lambda m: m.ground.height, self.model, inputs.height)
+        model = self._in_wind(state, inputs)
+        if model.ground is None or inputs.height is None:
+            return model, None
+        over = eqx.tree_at(lambda m: m.ground.height, model, inputs.height)
         if inputs.turn is None:
             return over, None
-        normal = TurnedPlane(inputs.height, self.model.ground.slope, inputs.turn).normal
+        normal = TurnedPlane(inputs.height, model.ground.slope, inputs.turn).normal
         # straight aft or ahead x will do, with either sign of the slope: smooth where the ground is level
         aside = normal[1] != 0
         across = jnp.sqrt(jnp.where(aside, normal[0] ** 2 + normal[1] ** 2, 1.0))
         uphill = jnp.where(aside, -normal[:2] / across, jnp.array([1.0, 0.0]))
         slope = jnp.arctan2(-normal[:2] @ uphill, normal[2])
-        distance = inputs.height * jnp.cos(self.model.ground.slope)
+        distance = inputs.height * jnp.cos(model.ground.slope)
         ground = Plane(distance / normal[2], slope)
         return eqx.tree_at(lambda m: m.ground, over, ground), uphill
+
+    def _in_wind(self, state: Float[Array, " M"], inputs: RotorInputs) -> FiniteStateModel:
+        """The model whose wake contracts as the wind along the disk lets it, by momentum theory."""
+        if self.model.wake is None:
+            return self.model
+        wind, first = edgewise(inputs), 2 / jnp.sqrt(3.0) * state[self.model.modes.index(0, 1)]
+        squares = jnp.stack([wind @ wind + (n * first) ** 2 + STILL for n in (1, 2)])  # of V_T at the disk, far below
+        wake = self.model.wake.in_stream(jnp.sqrt(squares[0] / squares[1]))
+        return eqx.tree_at(lambda m: m.wake, self.model, wake)
 
 
 def _turn(modes: ModeTable, cosine: Float[Array, ""], sine: Float[Array, ""]) -> Float[Array, "M M"]:
@@ -102,11 +128,15 @@ def _turn(modes: ModeTable, cosine: Float[Array, ""], sine: Float[Array, ""]) ->
     return matrix
 
 
-def finite_state(ground: Plane | None = None, harmonics: int = 2, radial_terms: int = 3) -> FiniteStateInflow:
+def finite_state(
+    ground: Plane | None = None, harmonics: int = 2, radial_terms: int = 3, **settings: Unpack[Settings]
+) -> FiniteStateInflow:
     """Make the model. harmonics, radial_terms: of the inflow; over ground the sources have the same harmonics.
+    settings: see `finite_state_model`.
 
     Raises InputError where a count is not allowed.
     """
+    settings = {"quadrature": DiskQuadrature(16, 16), **settings}
     return FiniteStateInflow(
-        finite_state_model(ground, harmonics, radial_terms, ground_harmonics=harmonics if ground is not None else 0)
+        finite_state_model(ground, harmonics, radial_terms, harmonics if ground is not None else 0, 5, **settings)
     )

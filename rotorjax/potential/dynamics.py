@@ -1,7 +1,9 @@
 """The dynamic rotor: [M]å + [D][V][L]⁻¹[M]a = [D]τ forward in time, and its costates backward (Eq. 1).
 
 Time is azimuth (rad), so a dot is d/dψ. Mass flow: V_T = √(μ² + λ²) for a_1^0 and V̄ = (μ² + λ(λ + λ_i))/V_T for the
-others, λ = λ_climb + λ_i, λ_i = (2/√3)[L⁻¹Ma]_1; in hover V and 2V, as in Eq. 4. "linear" takes V_T for all.
+others, λ = λ_climb + λ_i, λ_i = (2/√3)[L⁻¹Ma]_1; in hover V and 2V, as in Eq. 4. Which modes are "others" is the
+model's `mass_flow`. Where the model counts the ground in, λ_i is the whole induced mean flow through the disk, the
+sources' upflow taken off.
 
 With odd modes only, the field of an acceleration is the nearest that the odd functions offer; even modes
 (`even_terms` of the model) complete them, and the flow converges to the exact linear one at every frequency.
@@ -24,7 +26,7 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.potential.field import pressure_functions
 from rotorjax.potential.matrices import apparent_mass, damping, influence
-from rotorjax.potential.model import FiniteState, FiniteStateModel, ground_matrix
+from rotorjax.potential.model import FiniteState, FiniteStateModel, answer_means, rotor_means, with_ground
 from rotorjax.potential.modes import ModeTable
 
 
@@ -52,29 +54,29 @@ def _total_speed(mu: Float[Array, ""], through: Float[Array, ""]) -> Float[Array
 
 
 def mean_induced_inflow(a: Float[Array, " M"], model: FiniteStateModel) -> Float[Array, ""]:
-    """Return λ_i = (2/√3) a_1^0, the mean inflow of the first state over ΩR (axial flow)."""
-    return 2 / np.sqrt(3) * a[model.modes.index(0, 1)]
+    """Return λ_i, the mean inflow of the rotor's states over ΩR (axial flow): (2/√3) a_1^0, and little of others."""
+    return rotor_means(model, model.ground) @ a
 
 
-def _skew(a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel) -> Float[Array, ""]:
-    """X = tan(χ/2) = sin χ/(1 + cos χ) of the mean inflow of the first state, χ = atan(μ/λ)."""
-    through = inputs.climb + mean_induced_inflow(a, model)
+def _skew(
+    a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel, upflow: Float[Array, ""]
+) -> Float[Array, ""]:
+    """X = tan(χ/2) = sin χ/(1 + cos χ) of the mean inflow, χ = atan(μ/λ)."""
+    through = inputs.climb + mean_induced_inflow(a, model) - upflow
     below = _total_speed(inputs.mu, through) + jnp.abs(through)
     return inputs.mu / jnp.where(below > 0, below, 1.0)
 
 
-def _unskewed(
-    a: Float[Array, " M"], vectors: Float[Array, "M ..."], inputs: RotorInputs, model: FiniteStateModel
-) -> Float[Array, "M ..."]:
-    """L⁻¹M vectors, the cosine and the sine modes on their own."""
-    mass, x = apparent_mass(model.modes, model.modes), _skew(a, inputs, model)
+def _unskewed(x: Float[Array, ""], vectors: Float[Array, "M ..."], model: FiniteStateModel) -> Float[Array, "M ..."]:
+    """L⁻¹M vectors at a skew X, the cosine and the sine modes on their own."""
+    mass = apparent_mass(model.modes, model.modes)
     l = influence(model.modes, model.modes, x)
     result = jnp.zeros_like(vectors)
     for kind in ("cos", "sin"):
         rows = np.array([i for i, mode in enumerate(model.modes.modes) if mode.kind == kind])
         if rows.size:
             block = np.ix_(rows, rows)
-            solved = jnp.linalg.solve(l[block], jnp.asarray(mass[block], a.dtype) @ vectors[rows])
+            solved = jnp.linalg.solve(l[block], jnp.asarray(mass[block], vectors.dtype) @ vectors[rows])
             result = result.at[rows].set(solved)
     return result
 
@@ -82,13 +84,11 @@ def _unskewed(
 def mass_flow(
     a: Float[Array, " M"], induced: Float[Array, ""], inputs: RotorInputs, model: FiniteStateModel
 ) -> Float[Array, " M"]:
-    """Return the diagonal of V at the induced mean inflow λ_i = (2/√3)[L⁻¹Ma]_1, over ΩR."""
+    """Return the diagonal of V at the induced mean flow λ_i through the disk, over ΩR."""
     through = inputs.climb + induced
     speed = _total_speed(inputs.mu, through)
-    if model.mass_flow == "linear":
-        return jnp.full_like(a, 1) * speed
     later = (inputs.mu**2 + through * (through + induced)) / jnp.where(speed > 0, speed, 1.0)
-    return jnp.where(np.arange(len(model.modes)) == model.modes.index(0, 1), speed, later)
+    return jnp.where(model.varying, later, speed) * jnp.ones_like(a)
 
 
 def flow_matrices(
@@ -98,10 +98,10 @@ def flow_matrices(
 
     skewed=False leaves the wake straight (χ = 0), where L⁻¹M = 1 and no system is solved.
     """
-    inverse = jnp.eye(len(model.modes), dtype=a.dtype)
+    inverse, upflow = jnp.eye(len(model.modes), dtype=a.dtype), answer_means(model) @ a
     if skewed:
-        inverse = _unskewed(a, inverse, inputs, model)
-    return mass_flow(a, mean_induced_inflow(inverse @ a, model), inputs, model), inverse
+        inverse = _unskewed(_skew(a, inputs, model, upflow), inverse, model)
+    return mass_flow(a, mean_induced_inflow(inverse @ a, model) - upflow, inputs, model), inverse
 
 
 @cache
@@ -119,16 +119,20 @@ def rhs(
     Start from a state whose c is G a (`with_ground`). In skewed flow G still assumes the wake under the rotor.
     """
     del t
-    a = _unskewed(state.a, state.a, inputs, model) if skewed else state.a
-    v = mass_flow(a, mean_induced_inflow(a, model), inputs, model)
-    return with_ground(jnp.asarray(rate_table(model.modes), a.dtype) @ (inputs.tau - v * a), model)
+    return with_ground(rotor_rate(state.a, inputs, model, answer_means(model) @ state.a, skewed), model)
 
 
-def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
-    """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
-    if model.ground is None:
-        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    return FiniteState(a, ground_matrix(model, model.ground) @ a)
+def rotor_rate(
+    a: Float[Array, " M"],
+    inputs: RotorInputs,
+    model: FiniteStateModel,
+    upflow: Float[Array, ""],
+    skewed: bool = True,
+) -> Float[Array, " M"]:
+    """Return da/dψ under the mean upflow of the ground's sources through the disk, over ΩR (0: left out)."""
+    seen = _unskewed(_skew(a, inputs, model, upflow), a, model) if skewed else a
+    v = mass_flow(seen, mean_induced_inflow(seen, model) - upflow, inputs, model)
+    return jnp.asarray(rate_table(model.modes), a.dtype) @ (inputs.tau - v * seen)
 
 
 @eqx.filter_jit

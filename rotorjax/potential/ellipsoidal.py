@@ -29,7 +29,7 @@ class Ellipsoidal(NamedTuple):
 def nu_eta(radius_squared: Float[Array, "*N"], z: Float[Array, "*N"]) -> tuple[Float[Array, "*N"], Float[Array, "*N"]]:
     """Return (ν, η) from r̄² = x̄² + ȳ² and z̄ (positive down), over R (Eqs. 20a, 20b)."""
     d = 1 - radius_squared - z * z
-    edge = (d == 0) & (z == 0)
+    edge = d * d + 4 * z * z == 0  # also where z is so small that its square is zero
     d, z_safe = jnp.where(edge, 1.0, d), jnp.where(edge, 0.0, z)
     root = jnp.sqrt(d * d + 4 * z_safe * z_safe)
     inner = d >= 0  # |ν| ≥ η

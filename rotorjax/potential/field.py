@@ -60,6 +60,9 @@ def disk_functions(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"
     return jnp.where(inside, _by_mode(modes, legendre_p(modes.pairs, nu), on_disk), 0.0)
 
 
+RIM = 1e-6  # over R: how far off the rim the velocity there is taken
+
+
 def sigma(m: int, n: int) -> float:
     """Return σ_n^m of Eq. 26."""
     return 1 / (k_constant(m, n) * sqrt((2 * n + 1) * (2 * n + 3) * ((n + 1) ** 2 - m**2)))
@@ -110,7 +113,12 @@ def velocity_potentials(
 
 
 def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
-    """Return the velocity (hub frame) of each mode's unit state on and above the disk: ∇Ψ, the axial one being −Φ."""
+    """Return the velocity (hub frame) of each mode's unit state on and above the disk: ∇Ψ, the axial one being −Φ.
+
+    On the rim itself, where the coordinates have no derivative, the in-plane components are those just outside it.
+    """
+    rim = (points[..., 0] ** 2 + points[..., 1] ** 2 == 1) & (points[..., 2] == 0)
+    outward = jnp.where(rim[..., None], RIM * jnp.array([1.0, 1.0, 0.0], points.dtype), 0.0)
 
     def potentials(p: Array) -> Array:
         return velocity_potentials(modes, p)
@@ -118,7 +126,9 @@ def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[
     axes = jnp.broadcast_to(
         jnp.eye(3, dtype=points.dtype)[:2].reshape(2, *(1,) * (points.ndim - 1), 3), (2, *points.shape)
     )
-    in_plane = jax.vmap(lambda axis: jax.jvp(potentials, (points,), (axis,))[1])(axes)  # each value has its own point
+    in_plane = jax.vmap(lambda axis: jax.jvp(potentials, (points * (1 + outward),), (axis,))[1])(
+        axes
+    )  # each value has its own point
     return jnp.concatenate([in_plane, -pressure_functions(modes, points)[None]])
 
 

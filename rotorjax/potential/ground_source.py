@@ -16,12 +16,14 @@ S = V_e G, should read S = G V_e.
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
+from rotorjax.potential.contraction import Contraction, far_flow
 from rotorjax.potential.ellipsoidal import ellipsoidal
 from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions
 from rotorjax.potential.modes import ModeTable
@@ -72,17 +74,29 @@ class DiskQuadrature(eqx.Module):
         return (r * np.cos(psi)).ravel(), (r * np.sin(psi)).ravel(), nu.ravel(), weights.ravel()
 
 
+SHEET = DiskQuadrature(24, 32)  # of a tilted sheet's sources
+
+
 def depth(ground: Plane, x: Float[Array, "*N"]) -> Float[Array, "*N"]:
     """Return the depth of the plane under the hub-frame station x along the shaft, over R (Eq. 9)."""
     return ground.height - x * jnp.tan(ground.slope)
 
 
 def rotor_on_ground(
-    modes: ModeTable, ground: Plane, x: Float[Array, "*N"], y: Float[Array, "*N"]
+    modes: ModeTable,
+    ground: Plane,
+    x: Float[Array, "*N"],
+    y: Float[Array, "*N"],
+    wake: Contraction | None = None,
 ) -> Float[Array, "M ..."]:
-    """Return the flow of unit rotor states into the plane at its points (x, y), along its normal (Eqs. 32, 34)."""
+    """Return the flow of unit rotor states into the plane at its points (x, y), along its normal (Eqs. 32, 34).
+
+    wake: over this plane; None: a cylinder.
+    """
     points = jnp.stack([x, y, -depth(ground, x)], axis=-1)
-    return jnp.cos(ground.slope) * axial_functions(modes, points)
+    if wake is None:
+        return jnp.cos(ground.slope) * axial_functions(modes, points)
+    return jnp.cos(ground.slope) * far_flow(axial_functions, modes, points, wake)
 
 
 def ground_on_rotor(
@@ -91,8 +105,32 @@ def ground_on_rotor(
     """Return the upward velocity of unit ground states at hub-frame points above the plane (Eqs. 35, 46)."""
     above = jnp.stack([points[..., 0], points[..., 1], points[..., 2] + depth(ground, points[..., 0])], axis=-1)
     functions = pressure_functions(modes, above)
+    if not modes.diagonal.any():
+        return functions
     diagonal = jnp.asarray(modes.diagonal).reshape((-1,) + (1,) * (points.ndim - 1))
     return functions * jnp.where(diagonal, correction.factor(ellipsoidal(above).eta), 1.0)
+
+
+def sheet_flow(
+    modes: ModeTable, ground: Plane, points: Float[Array, "*N 3"], sheet: DiskQuadrature = SHEET
+) -> Float[Array, "M ..."]:
+    """Return the upward velocity of sources on the plane itself, of density 2P̄ {cos, sin} mψ per area of the disk.
+
+    modes: odd. The sources at (x', y') lie at their own depth h − x' tan δ. Level, that is Φ; the difference to Φ at
+    the depth under the point is smooth above the plane and taken by quadrature; it is zero on a level plane.
+    """
+    x, y, nu, weights = (jnp.asarray(v, points.dtype) for v in sheet.rule())
+    density = disk_functions(modes, x, y) * (nu * weights)  # dA/2π
+    level = points.at[..., 2].add(depth(ground, points[..., 0]))
+
+    def tilt(point: Array) -> Array:
+        """What the sheet's tilt adds at a point."""
+        across = (point[0] - x) ** 2 + (point[1] - y) ** 2 + 1e-18  # a point on a node has no flow of that node
+        own, under = point[2] + depth(ground, x), point[2] + depth(ground, point[0])
+        return density @ (own * (across + own * own) ** -1.5 - under * (across + under * under) ** -1.5)
+
+    added = jax.lax.map(tilt, points.reshape(-1, 3), batch_size=256)
+    return pressure_functions(modes, level) + jnp.moveaxis(added.reshape(*points.shape[:-1], len(modes)), -1, 0)
 
 
 def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "G ..."]:
@@ -101,15 +139,24 @@ def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) ->
 
 
 def correlation(rotor: ModeTable, sources: ModeTable, ground: Plane, quadrature: DiskQuadrature) -> Float[Array, "G M"]:
-    """Return the velocity correlation matrix G of c = G a (Eqs. 36, 37, 42), cos δ included.
+    """Return the velocity correlation matrix G of c = G a for a cylinder (Eqs. 36, 37, 42), cos δ included.
 
     The source functions are orthonormal over dν dψ, so projecting the incoming flow on them is the least-squares
     solution.
     """
-    dtype = ground.height.dtype
-    x, y, _, weights = (jnp.asarray(v, dtype) for v in quadrature.rule())
-    share = jnp.where(sources.m == 0, 1.0, 2.0).astype(dtype)[:, None]
-    return share * (self_flow(sources, x, y) * weights) @ rotor_on_ground(rotor, ground, x, y).T
+    x, y, _, _ = (jnp.asarray(v, ground.height.dtype) for v in quadrature.rule())
+    return source_solver(sources, quadrature) @ rotor_on_ground(rotor, ground, x, y).T
+
+
+def printed_strengths(rotor: ModeTable, sources: ModeTable) -> tuple[np.ndarray, np.ndarray]:
+    """Return the factors by row and by column, (G,) and (M,), that make G what Eqs. 38, 40 and 41 say as printed.
+
+    ω = V_e G τ with τ = V̂ a and ω = 2V c: c = V_e G (V̂/2V) a. V_e has 2 in its first row, of j = 2 in Appendix D, and
+    V̂ is V for a_1^0, 2V for the others (Eq. 4).
+    """
+    row = np.array([2.0 if (mode.m, mode.n) == (0, 2) else 1.0 for mode in sources.modes])
+    column = np.array([0.5 if (mode.m, mode.n) == (0, 1) else 1.0 for mode in rotor.modes])
+    return row, column
 
 
 def source_solver(

@@ -6,12 +6,13 @@ root of the height, the slope, the edge), split by symmetry into blocks that do 
 value decomposition. The interpolation is smooth: derivatives by height, slope and place are those of the interpolant.
 
 Rows: the L coefficients of the upward flow on the rotor's disk in the functions P̄_j^r (j + r even) of `disk_modes`,
-which are complete there but for harmonics above the rotor's own, which bear no load. Columns:
-states at K + 1 nodes of the wake (one where it has no transit time), then the plane's velocity, uniform and by x. The
-source states themselves are those of `moving_ground.ground_states`.
+which are complete there but for harmonics above the rotor's own, which bear no load; the nearest ones by area, so that
+mean and first harmonic are exact. What the rotor's own inflow loses where its wake contracts less over ground is
+counted among it. Columns: states at K + 1 nodes of the wake (one where it has no transit time), then the plane's
+velocity, uniform and by x. The source states themselves are those of `moving_ground.ground_states`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import equinox as eqx
 import jax
@@ -21,12 +22,21 @@ from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
+from rotorjax.potential.contraction import NODES
 from rotorjax.potential.field import disk_functions
-from rotorjax.potential.ground_source import rotor_on_ground, source_solver
-from rotorjax.potential.model import FiniteStateModel, footprint, ground_upflow
+from rotorjax.potential.ground_source import DiskQuadrature
+from rotorjax.potential.model import (
+    FiniteStateModel,
+    closing,
+    footprint,
+    ground_upflow,
+    rotor_flow,
+    rotor_into_ground,
+    strength_factors,
+)
 from rotorjax.potential.modes import ModeTable, ground_modes
 from rotorjax.potential.wake_transport import WakeTransport, transported_flow
-from rotorjax.region import HalfPlane
+from rotorjax.region import HalfPlane, Region
 
 
 class GroundTable(eqx.Module):
@@ -86,27 +96,56 @@ def disk_modes(model: FiniteStateModel) -> ModeTable:
 
 def disk_projection(model: FiniteStateModel, ground: Plane) -> Float[Array, "L G"]:
     """Return the matrix from source states to the coefficients of their upward flow on the rotor disk."""
-    x, y, _, weights = (jnp.asarray(v) for v in model.quadrature.rule())
-    modes = disk_modes(model)
-    share = jnp.where(modes.m == 0, 1.0, 2.0)[:, None]
-    flow = ground_upflow(model, ground, jnp.stack([x, y, jnp.zeros_like(x)], axis=-1))
-    return (share * disk_functions(modes, x, y) * weights) @ flow.T
+    return _on_disk(
+        model, model.quadrature, lambda x, y: ground_upflow(model, ground, jnp.stack([x, y, 0 * x], axis=-1))
+    )
+
+
+def _on_disk(
+    model: FiniteStateModel, quadrature: DiskQuadrature, flow: Callable[[Array, Array], Float[Array, "X N"]]
+) -> Float[Array, "L X"]:
+    """Coefficients of flows (x, y) ↦ (X, N) on the disk: least squares by area."""
+    x, y, nu, weights = (jnp.asarray(v) for v in quadrature.rule())
+    basis = disk_functions(disk_modes(model), x, y)
+    return jnp.linalg.solve((basis * nu * weights) @ basis.T, (basis * nu * weights) @ flow(x, y).T)
 
 
 def flow_matrix(model: FiniteStateModel, ground: Plane, transport: WakeTransport | None) -> Float[Array, "N C"]:
     """Return the flow into the plane at the ground disk's points of each column."""
-    x, y = footprint(model)
+    x, y = footprint(model, ground)
     if transport is None:
-        flow = rotor_on_ground(model.modes, ground, x, y).T
+        flow = rotor_into_ground(model, ground).T
     else:
         flow = jnp.moveaxis(transported_flow(model, transport, ground, x, y), 1, 2).reshape(x.size, -1)
     return jnp.concatenate([flow, jnp.ones_like(x)[:, None], x[:, None]], axis=1)
 
 
-def response(model: FiniteStateModel, ground: Plane, transport: WakeTransport | None) -> Float[Array, "L C"]:
-    """Return the matrix of one geometry, untabulated."""
-    solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)
-    return disk_projection(model, ground) @ (solver @ flow_matrix(model, ground, transport))
+def response(
+    model: FiniteStateModel, ground: Plane, transport: WakeTransport | None, edges: Float[Array, " E"] | None = None
+) -> Float[Array, "E L C"]:
+    """Return the matrix of one plane, untabulated, for each edge of a half-plane; without edges E = 1."""
+    into, onto = flow_matrix(model, ground, transport), disk_projection(model, ground)
+    row, column = strength_factors(model)
+    copies = 1 if transport is None else transport.nodes + 1
+    factor = row[:, None] * jnp.tile(column, copies)
+
+    def answer(region: Region | None) -> Float[Array, "L C"]:
+        states = closing(eqx.tree_at(lambda m: m.region, model, region, is_leaf=lambda r: r is None), ground) @ into
+        return onto @ jnp.concatenate([factor * states[:, :-2], states[:, -2:]], axis=1)
+
+    if edges is None:
+        found = answer(model.region)[None]
+    else:
+        found = jax.lax.map(lambda edge: answer(eqx.tree_at(lambda r: r.edge, model.region, edge)), edges)
+    return found.at[:, :, : len(model.modes)].add(_lost(model, ground))
+
+
+def _lost(model: FiniteStateModel, ground: Plane) -> Float[Array, "L M"]:
+    """What the rotor's inflow loses where its wake contracts less than far from the ground."""
+    if model.wake is None:
+        return jnp.zeros((len(disk_modes(model)), len(model.modes)))
+    fine = DiskQuadrature(NODES, model.quadrature.nodes_psi)
+    return _on_disk(model, fine, lambda x, y: rotor_flow(model, None, x, y) - rotor_flow(model, ground, x, y))
 
 
 def ground_table(
@@ -133,12 +172,7 @@ def ground_table(
         for (low, high), n in zip(ranges, counts, strict=True)
     ]
     points = jnp.asarray(np.stack(np.meshgrid(*grids[:2], indexing="ij"), axis=-1).reshape(-1, 2))
-    onto, into = _over_planes(model, points, transport)
-    if edge is None:
-        solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)[None]
-    else:
-        solver = _over_edges(model, jnp.asarray(grids[2]))
-    values = np.asarray(jnp.einsum("plg,egn,pnc->pelc", onto, solver, into, optimize="optimal"))
+    values = np.asarray(_over_planes(model, points, transport, None if edge is None else jnp.asarray(grids[2])))
     values = values.reshape(-1, *values.shape[2:])
     level = not np.any(np.array(slope_deg)) and model.region is None
     rows, columns = _blocks(model, 1 if transport is None else transport.nodes + 1, level)
@@ -158,21 +192,13 @@ def ground_table(
 
 
 @eqx.filter_jit
-def _over_planes(model: FiniteStateModel, points: Float[Array, "P 2"], transport: WakeTransport | None) -> tuple:
-    def one(point: Array) -> tuple[Array, Array]:
-        ground = Plane(point[0] ** 2, point[1])
-        return disk_projection(model, ground), flow_matrix(model, ground, transport)
-
-    return jax.lax.map(one, points)
-
-
-@eqx.filter_jit
-def _over_edges(model: FiniteStateModel, edges: Float[Array, " E"]) -> Float[Array, "E G N"]:
-    def one(edge: Array) -> Array:
-        region = eqx.tree_at(lambda r: r.edge, model.region, edge)
-        return source_solver(model.sources, model.quadrature, region, model.ground_radius)
-
-    return jax.lax.map(one, edges)
+def _over_planes(
+    model: FiniteStateModel,
+    points: Float[Array, "P 2"],
+    transport: WakeTransport | None,
+    edges: Float[Array, " E"] | None,
+) -> Float[Array, "P E L C"]:
+    return jax.lax.map(lambda point: response(model, Plane(point[0] ** 2, point[1]), transport, edges), points)
 
 
 def _check(model, height, slope_deg, edge, transport) -> None:

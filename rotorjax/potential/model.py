@@ -5,43 +5,98 @@
     state = steady_state(model, tau)
     lam = inflow(state, r, psi, model)
 
+The paper leaves choices open or makes them in a way that neither measurements nor a free wake bear out. Each is named,
+and the model carries it (`Settings`); `finite_state_model(printed=True)` is the paper's own:
+
+| choice | default | as printed |
+|---|---|---|
+| strengths | "closed": c = G a, the plane is closed | "printed": S = V_e G; half of the flow goes through the plane |
+| ground_parity | "odd": sources on the plane alone | "even", with the factor (π/7)^{η²} on the r = j terms |
+| ground_in_mass_flow | V_T, V̄ of the inflow that the disk has | V = √(C_T/2), the ground left out |
+| slope | "tilted": sources where the plane is | "sheared": at the depth under each point (Eq. 9) |
+| wake | `contraction()`: it narrows to R/√2 | None: a cylinder |
+| mass_flow | "harmonics": V_T, and V̄ for harmonics | "paper": V̄ = 2V for all but the first state (Eq. 4) |
+
 Lengths over R, velocities over ΩR, hub frame (x aft, y to starboard, z up); inflow positive down.
 """
 
-from typing import Literal, get_args
+from typing import Any, Literal, TypedDict, Unpack, get_args
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
+from rotorjax.potential.contraction import Contraction, contraction, disk_flow, disk_means, wake_flow
 from rotorjax.potential.field import disk_functions, field_functions
 from rotorjax.potential.ground_source import (
     Correction,
     DiskQuadrature,
     correction,
-    correlation,
     ground_on_rotor,
+    printed_strengths,
     rotor_on_ground,
     self_flow,
+    sheet_flow,
     source_solver,
 )
-from rotorjax.potential.loading import thrust_coefficient
 from rotorjax.potential.modes import ModeTable, ground_modes, rotor_modes
 from rotorjax.region import Region
 
-MassFlow = Literal["paper", "linear"]
+MassFlow = Literal["harmonics", "paper", "linear"]
+Strengths = Literal["closed", "printed"]
+Slope = Literal["tilted", "sheared"]
+MEAN = DiskQuadrature(16, 16)  # of the sources' upflow, smooth on the disk
+LOWEST_EVEN = 0.2
+NO_THRUST = 1e-10  # of C_T/2: below it V, which has no derivative there, stays at 1e-5
+
+
+class Settings(TypedDict, total=False):
+    """The model's choices (see the module's head) and sizes, by keyword."""
+
+    strengths: Strengths
+    ground_parity: Literal["even", "odd"]
+    ground_in_mass_flow: bool
+    slope: Slope
+    wake: Contraction | None
+    mass_flow: MassFlow
+    b: float
+    p: float
+    even_terms: int
+    quadrature: DiskQuadrature | None
+    region: Region | None
+    ground_radius: float | None
+
+
+PRINTED = Settings(
+    strengths="printed",
+    ground_parity="even",
+    ground_in_mass_flow=False,
+    slope="sheared",
+    wake=None,
+    mass_flow="paper",
+)
+_CHOICES = {
+    "strengths": get_args(Strengths),
+    "ground_parity": ("even", "odd"),
+    "ground_in_mass_flow": (True, False),
+    "slope": get_args(Slope),
+    "mass_flow": get_args(MassFlow),
+}
 
 
 class FiniteStateModel(eqx.Module):
     """The model's static choices and its parameters.
 
     modes: rotor table, M modes; sources: ground table, G modes (static). ground: `Plane` or None. correction: b and
-    p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). mass_flow (static):
-    "paper" gives V to a_1^0 and 2V to all others (Eq. 4); "linear" gives V to all. region: the part of the plane where
-    there is ground, None for all of it. ground_radius (): of the ground disk, over R, None for 1.
+    p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). wake: how it contracts
+    far from the ground, None for a cylinder. region: the part of the plane where there is ground, None for all of it.
+    ground_radius (): of the ground disk, over R, None for that of the wake there. strengths, ground_in_mass_flow,
+    slope, mass_flow: static, see the module's head; mass_flow "paper" gives V_T to a_1^0 and V̄ to all others, "linear"
+    V_T to all, "harmonics" V_T to the axisymmetric ones.
     """
 
     modes: ModeTable
@@ -52,6 +107,10 @@ class FiniteStateModel(eqx.Module):
     mass_flow: MassFlow = eqx.field(static=True)
     region: Region | None = None
     ground_radius: Float[Array, ""] | None = None
+    wake: Contraction | None = None
+    strengths: Strengths = eqx.field(static=True, default="closed")
+    ground_in_mass_flow: bool = eqx.field(static=True, default=False)
+    slope: Slope = eqx.field(static=True, default="sheared")
 
     def __check_init__(self) -> None:
         """Raise InputError where the modes' parities do not match their use."""
@@ -59,6 +118,20 @@ class FiniteStateModel(eqx.Module):
             raise InputError("Argument `modes` must have modes with n + m odd, which carry the load, but has none")
         if self.sources.parity == "both":
             raise InputError("Argument `sources` must be all even or all odd in j + r, but has parity 'both'")
+        if self.slope == "tilted" and self.sources.parity == "even":
+            raise InputError(
+                "Argument `slope` must be 'sheared' with ground_parity 'even', whose sources are not on the plane "
+                "alone, but is 'tilted'"
+            )
+
+    @property
+    def varying(self) -> np.ndarray:
+        """Which modes the mass flow V̄ carries, (M,); V_T carries the others."""
+        if self.mass_flow == "linear":
+            return np.zeros(len(self.modes), bool)
+        if self.mass_flow == "harmonics":
+            return self.modes.m > 0
+        return np.arange(len(self.modes)) != self.modes.index(0, 1)
 
 
 class FiniteState(eqx.Module):
@@ -73,100 +146,226 @@ def finite_state_model(
     harmonics: int = 0,
     radial_terms: int = 3,
     ground_harmonics: int = 0,
-    ground_radial_terms: int = 5,
-    b: float = float(np.pi / 7),
-    p: float = 2.0,
-    mass_flow: MassFlow = "paper",
-    ground_parity: Literal["even", "odd"] = "even",
-    even_terms: int = 0,
-    quadrature: DiskQuadrature | None = None,
-    region: Region | None = None,
-    ground_radius: float | None = None,
+    ground_radial_terms: int = 7,
+    printed: bool = False,
+    **settings: Unpack[Settings],
 ) -> FiniteStateModel:
-    """Make the model; its defaults are the paper's for level ground (τ₁, τ₃, τ₅; b^{η^p} with π/7 and 2).
+    """Make the model: by default the choices that agree best with measurements and the free wake, or the paper's own.
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
-    terms of each harmonic; ground_parity: see `modes.ground_modes` (b and p matter for "even" only); even_terms: see
-    `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground (`rotorjax.region`,
-    best with ground_parity "odd", ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk, 1
-    by default. Raises InputError where a count, b, p, mass_flow, ground_parity or ground_radius is not allowed.
+    terms of each harmonic (τ₁, τ₃, τ₅). printed: the paper's choices (`PRINTED`). settings: single ones instead of
+    these (`Settings`): b, p: of the factor b^{η^p} on the r = j terms, which only even sources have (π/7 and 2);
+    even_terms: see `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground
+    (`rotorjax.region`, best with ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk.
+    Raises InputError where a count or a setting is not allowed.
     """
-    if mass_flow not in get_args(MassFlow):
-        raise InputError(f"Argument `mass_flow` must be one of {get_args(MassFlow)}, but is {mass_flow!r}")
-    if ground_parity not in ("even", "odd"):
-        raise InputError(f"Argument `ground_parity` must be 'even' or 'odd', but is {ground_parity!r}")
-    if ground_radius is not None and not (np.isfinite(ground_radius) and ground_radius > 0):
-        raise InputError(f"Argument `ground_radius` must be positive and finite (over R), but is {ground_radius}")
-    quadrature = quadrature or DiskQuadrature()
-    least = 2 * max(harmonics, ground_harmonics) + 1
-    if quadrature.nodes_psi < least:
-        raise InputError(f"Argument `quadrature` must have at least {least} nodes in ψ, but has {quadrature.nodes_psi}")
+    chosen: dict[str, Any] = {
+        "strengths": "closed",
+        "ground_parity": "odd",
+        "ground_in_mass_flow": True,
+        "slope": "tilted",
+        "wake": contraction(),
+        "mass_flow": "harmonics",
+        **(PRINTED if printed else {}),
+        **settings,
+    }
+    _check(chosen, harmonics, ground_harmonics)
+    _check_height(ground, chosen)
+    radius = chosen.get("ground_radius")
     return FiniteStateModel(
-        rotor_modes(harmonics, radial_terms, even_terms),
-        ground_modes(ground_harmonics, ground_radial_terms, ground_parity),
+        rotor_modes(harmonics, radial_terms, chosen.get("even_terms", 0)),
+        ground_modes(ground_harmonics, ground_radial_terms, chosen["ground_parity"]),
         ground,
-        correction(b, p),
-        quadrature,
-        mass_flow,
-        region,
-        None if ground_radius is None else jnp.asarray(ground_radius, float),
+        correction(chosen.get("b", float(np.pi / 7)), chosen.get("p", 2.0)),
+        chosen.get("quadrature") or DiskQuadrature(),
+        chosen["mass_flow"],
+        chosen.get("region"),
+        None if radius is None else jnp.asarray(radius, float),
+        **{name: chosen[name] for name in ("wake", "strengths", "ground_in_mass_flow", "slope")},
     )
 
 
-def footprint(model: FiniteStateModel) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+def _check(chosen: dict[str, Any], harmonics: int, ground_harmonics: int) -> None:
+    """Raise InputError for a setting that does not exist, is not allowed or would have no effect."""
+    if unknown := set(chosen) - set(Settings.__annotations__):
+        raise InputError(f"Arguments must be among {', '.join(Settings.__annotations__)}, but hold {unknown.pop()!r}")
+    for name, allowed in _CHOICES.items():
+        if chosen[name] not in allowed:
+            raise InputError(f"Argument `{name}` must be one of {allowed}, but is {chosen[name]!r}")
+    if chosen["ground_parity"] == "odd" and (idle := {"b", "p"} & set(chosen)):
+        raise InputError(
+            f"Argument `{idle.pop()}` must come with ground_parity='even', whose r = j terms it damps, but the sources "
+            "are odd"
+        )
+    radius = chosen.get("ground_radius")
+    if radius is not None and not (np.isfinite(radius) and radius > 0):
+        raise InputError(f"Argument `ground_radius` must be positive and finite (over R), but is {radius}")
+    quadrature, least = chosen.get("quadrature") or DiskQuadrature(), 2 * max(harmonics, ground_harmonics) + 1
+    if quadrature.nodes_psi < least:
+        raise InputError(f"Argument `quadrature` must have at least {least} nodes in ψ, but has {quadrature.nodes_psi}")
+
+
+def _check_height(ground: Plane | None, chosen: dict[str, Any]) -> None:
+    """Raise InputError where even sources that close the plane would turn the mean inflow upward."""
+    if ground is None or isinstance(ground.height, Tracer) or chosen["ground_parity"] == "odd":
+        return
+    if chosen["strengths"] == "closed" and float(ground.height) < LOWEST_EVEN:
+        raise InputError(
+            f"Argument `height` must be at least {LOWEST_EVEN} (over R) with ground_parity='even' and "
+            f"strengths='closed', whose inflow is negative below, but is {float(ground.height):g}: take the default's "
+            "odd sources"
+        )
+
+
+def choices(model: FiniteStateModel) -> dict[str, Any]:
+    """Return the model's choices by name, as plain values; the wake by its three numbers, absent where a cylinder."""
+    named = {name: getattr(model, name) for name in ("strengths", "ground_in_mass_flow", "slope", "mass_flow")}
+    wake = {} if model.wake is None else {f"wake_{k}": float(v) for k, v in vars(model.wake).items()}
+    return {**named, "ground_parity": model.sources.parity, **wake}
+
+
+def wake_over(model: FiniteStateModel, ground: Plane | None) -> Contraction | None:
+    """Return how the wake contracts over a plane, or far from any; None for a cylinder."""
+    return model.wake if model.wake is None or ground is None else model.wake.over(ground.height)
+
+
+def source_radius(model: FiniteStateModel, ground: Plane) -> Float[Array, ""]:
+    """Return the radius of the ground disk over R: the one that was given, or that of the wake there."""
+    if model.ground_radius is not None:
+        return model.ground_radius
+    wake = wake_over(model, ground)
+    return jnp.asarray(1.0) if wake is None else wake.radius
+
+
+def footprint(model: FiniteStateModel, ground: Plane) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
     """Return the stations (x, y) of the ground disk's quadrature points, over R."""
     x, y, _, _ = model.quadrature.rule()
-    size = 1.0 if model.ground_radius is None else model.ground_radius
+    size = source_radius(model, ground)
     return size * jnp.asarray(x), size * jnp.asarray(y)
 
 
+def closing(model: FiniteStateModel, ground: Plane) -> Float[Array, "G N"]:
+    """Return the matrix from normal velocities at the ground disk's points to the source states that answer them."""
+    return source_solver(model.sources, model.quadrature, model.region, source_radius(model, ground))
+
+
+def rotor_into_ground(model: FiniteStateModel, ground: Plane) -> Float[Array, "M N"]:
+    """Return the flow of unit rotor states into a plane at the ground disk's points, along its normal."""
+    return rotor_on_ground(model.modes, ground, *footprint(model, ground), wake_over(model, ground))
+
+
 def ground_matrix(model: FiniteStateModel, ground: Plane) -> Float[Array, "G M"]:
-    """Return G of c = G a (Eq. 36) for the model's region and ground disk over a plane."""
-    if model.region is None and model.ground_radius is None:
-        return correlation(model.modes, model.sources, ground, model.quadrature)
-    x, y = footprint(model)
-    solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)
-    return solver @ rotor_on_ground(model.modes, ground, x, y).T
+    """Return G of c = G a (Eq. 36) for the model's region, ground disk and strengths over a plane."""
+    row, column = strength_factors(model)
+    return row[:, None] * (closing(model, ground) @ rotor_into_ground(model, ground).T) * column
+
+
+def strength_factors(model: FiniteStateModel) -> tuple[Float[Array, " G"], Float[Array, " M"]]:
+    """Return the factors by row and by column, (G,) and (M,), on G that closes the plane; ones but for "printed"."""
+    if model.strengths == "printed":
+        row, column = printed_strengths(model.modes, model.sources)
+        return jnp.asarray(row), jnp.asarray(column)
+    return jnp.ones(len(model.sources)), jnp.ones(len(model.modes))
 
 
 def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "G ..."]:
     """Return the upward velocity of unit ground states at hub-frame points above a plane (Eqs. 35, 46)."""
-    if model.ground_radius is None:
-        return ground_on_rotor(model.sources, ground, model.correction, points)
-    shrunk = Plane(ground.height / model.ground_radius, ground.slope)
-    return ground_on_rotor(model.sources, shrunk, model.correction, points / model.ground_radius)
+    size = source_radius(model, ground)
+    ground, points = Plane(ground.height / size, ground.slope), points / size
+    if model.slope == "tilted":
+        return sheet_flow(model.sources, ground, points) / jnp.cos(ground.slope)
+    return ground_on_rotor(model.sources, ground, model.correction, points)
 
 
-def mass_flow_parameters(model: FiniteStateModel, tau: Float[Array, " M"]) -> Float[Array, " M"]:
-    """Return the diagonal of V̂ (Eq. 4) with V = √(C_T/2); τ must carry a positive thrust."""
-    v = jnp.sqrt(thrust_coefficient(tau, model.modes) / 2)
-    if model.mass_flow == "linear":
-        return jnp.full_like(tau, 1) * v
-    first = np.arange(len(model.modes)) == model.modes.index(0, 1)
-    return jnp.where(first, v, 2 * v)
+def mean_upflow(model: FiniteStateModel, ground: Plane) -> Float[Array, " G"]:
+    """Return the area-weighted mean over the disk of the upward velocity of unit ground states."""
+    x, y, nu, weights = MEAN.rule()
+    half = y > 0  # the plane rises along x: cosines are even in y, and sines have no mean
+    points = jnp.asarray(np.stack([x, y, 0 * x], axis=-1)[half])  # r dr = −ν dν
+    cosine = np.array([mode.kind == "cos" for mode in model.sources.modes])
+    return jnp.where(cosine, ground_upflow(model, ground, points) @ (4 * nu * weights)[half], 0.0)
+
+
+def rotor_means(model: FiniteStateModel, ground: Plane | None) -> Float[Array, " M"]:
+    """Return the area-weighted mean inflow of unit rotor states: 2/√3 of the first, little of others."""
+    wake = wake_over(model, ground)
+    if wake is None:
+        return jnp.where(np.arange(len(model.modes)) == model.modes.index(0, 1), 2 / np.sqrt(3), 0.0)
+    return disk_means(model.modes, wake)
+
+
+def answer_means(model: FiniteStateModel) -> Float[Array, " M"]:
+    """Return the mean upflow of the ground's answer to unit rotor states, zero where the mass flow leaves it out."""
+    if model.ground is None or not model.ground_in_mass_flow:
+        return jnp.zeros(len(model.modes))
+    return mean_upflow(model, model.ground) @ ground_matrix(model, model.ground)
+
+
+def mass_flow_parameters(
+    model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""] | float = 0.0
+) -> Float[Array, " M"]:
+    """Return the diagonal of V̂ under a loading in steady climb over ΩR: V_T = V_c + u and V̄ = V_c + 2u.
+
+    u is the induced mean flow through the disk, of the states τ/V̂ themselves: u V_T = Σ q (τ of V_T) + Σ q (τ of
+    V̄) V_T/V̄, where q is the mean inflow of unit states, the ground's answer included. In hover the ratio is ½
+    and nothing is left to solve; in climb four rounds are exact to rounding. Where the ground is left out, q τ =
+    C_T/2: V and 2V with V = √(C_T/2) in hover (Eq. 4). Under a thrust that points down V_T is that of the
+    opposite one; at zero thrust it is 1e-5.
+    """
+    loads = (rotor_means(model, model.ground) - answer_means(model)) * tau
+    first, rest = (jnp.sum(jnp.where(carried, loads, 0.0)) for carried in (~model.varying, model.varying))
+    ratio = jnp.asarray(0.5)
+    for _ in range(4):
+        root = jnp.sqrt(jnp.sqrt((first + ratio * rest) ** 2 + NO_THRUST**2) + climb**2 / 4)  # u + V_c/2
+        ratio = (root + climb / 2) / (2 * root)
+    return jnp.where(model.varying, 2 * root, root + climb / 2)
 
 
 @eqx.filter_jit
-def steady_state(model: FiniteStateModel, tau: Float[Array, " M"]) -> FiniteState:
-    """Return the states of a steady loading in hover, a = V̂⁻¹τ (Eq. 3) and c = G a (Eq. 36).
+def steady_state(
+    model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""] | float = 0.0
+) -> FiniteState:
+    """Return the states of a steady loading in hover or climb (over ΩR), a = V̂⁻¹τ (Eq. 3) and c = G a (Eq. 36).
 
-    tau: pressure coefficients of `model.modes` with positive C_T. Raises InputError where its shape differs.
+    tau: pressure coefficients of `model.modes`. Raises InputError where its shape differs.
     """
     if tau.shape != (len(model.modes),):
         raise InputError(
             f"Argument `tau` must have shape ({len(model.modes)},) as the model's modes, but has {tau.shape}"
         )
-    a = tau / mass_flow_parameters(model, tau)
+    return with_ground(tau / mass_flow_parameters(model, tau, climb), model)
+
+
+def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
+    """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
     if model.ground is None:
         return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
     return FiniteState(a, ground_matrix(model, model.ground) @ a)
+
+
+def rotor_flow(
+    model: FiniteStateModel, ground: Plane | None, x: Float[Array, "*N"], y: Float[Array, "*N"]
+) -> Float[Array, "M ..."]:
+    """Return the inflow of unit rotor states at stations (x, y) of the disk, over R, the wake as it is over a plane."""
+    wake = wake_over(model, ground)
+    return disk_functions(model.modes, x, y) if wake is None else disk_flow(model.modes, x, y, wake)
+
+
+def rotor_velocity(
+    model: FiniteStateModel, ground: Plane | None, points: Float[Array, "*N 3"]
+) -> Float[Array, "3 M ..."]:
+    """Return the velocity (hub frame) of unit rotor states at any points, the wake as it is over a plane."""
+    wake = wake_over(model, ground)
+    if wake is None:
+        return field_functions(model.modes, points)
+    return wake_flow(field_functions, model.modes, points, wake)
 
 
 def disk_inflow(
     state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel
 ) -> Float[Array, "*N"]:
     """Return λ over ΩR, positive down, at hub-frame stations (x, y) of the disk, over R, with the ground's effect."""
-    down = jnp.tensordot(state.a, disk_functions(model.modes, x, y), 1)
+    down = jnp.tensordot(state.a, rotor_flow(model, model.ground, x, y), 1)
     if model.ground is None:
         return down
     points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
@@ -177,10 +376,10 @@ def disk_inflow(
 def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N 3"]:
     """Return the induced velocity at hub-frame points over R, in the hub frame over ΩR.
 
-    On, above and below the disk, inside and outside the wake cylinder. The ground's part is its axial component
+    On, above and below the disk, inside and outside the wake. The ground's part is its axial component
     only, as in the paper, and holds above the plane.
     """
-    rotor = jnp.tensordot(state.a, field_functions(model.modes, points), [[0], [1]])
+    rotor = jnp.tensordot(state.a, rotor_velocity(model, model.ground, points), [[0], [1]])
     if model.ground is not None:
         up = jnp.tensordot(state.c, ground_upflow(model, model.ground, points), 1)
         rotor = rotor.at[2].add(up)
@@ -198,8 +397,8 @@ def inflow(
 @eqx.filter_jit
 def mean_inflow(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
     """Return the area-weighted mean of λ over the whole disk, over ΩR."""
-    x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
-    return (2 * nu * weights) @ disk_inflow(state, x, y, model)  # r dr = −ν dν
+    down = rotor_means(model, model.ground) @ state.a
+    return down if model.ground is None else down - mean_upflow(model, model.ground) @ state.c
 
 
 @eqx.filter_jit
@@ -211,15 +410,16 @@ def ground_normal_velocity_rms(state: FiniteState, model: FiniteStateModel) -> F
     """
     if model.ground is None:
         raise InputError("Argument `model` must have a ground, but its ground is None")
-    x, y = footprint(model)
-    into = state.a @ rotor_on_ground(model.modes, model.ground, x, y)
-    return relative_residual(state.c, into, model)
+    into = state.a @ rotor_into_ground(model, model.ground)
+    return relative_residual(state.c, into, model, model.ground)
 
 
-def relative_residual(c: Float[Array, " G"], into: Float[Array, " N"], model: FiniteStateModel) -> Float[Array, ""]:
+def relative_residual(
+    c: Float[Array, " G"], into: Float[Array, " N"], model: FiniteStateModel, ground: Plane
+) -> Float[Array, ""]:
     """Return the rms of what source states c leave of the flow `into` the ground disk's points, over that flow's."""
     x, y, nu, weights = (jnp.asarray(v, c.dtype) for v in model.quadrature.rule())
-    mask = jnp.ones_like(x) if model.region is None else model.region.mask(*footprint(model))
+    mask = jnp.ones_like(x) if model.region is None else model.region.mask(*footprint(model, ground))
     area = nu * weights * mask
     left = mask * into - c @ self_flow(model.sources, x, y)
     return jnp.sqrt((area @ left**2) / (area @ (mask * into) ** 2))

@@ -26,8 +26,14 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.potential.dynamics import RotorInputs
-from rotorjax.potential.ground_source import rotor_on_ground, source_solver
-from rotorjax.potential.model import FiniteStateModel, footprint, relative_residual
+from rotorjax.potential.model import (
+    FiniteStateModel,
+    closing,
+    footprint,
+    relative_residual,
+    rotor_into_ground,
+    strength_factors,
+)
 from rotorjax.potential.wake_transport import WakeTransport, transported_flow
 
 Variant = Literal["static", "quasi-steady", "dynamic"]
@@ -130,13 +136,21 @@ def flow_into_plane(
     Raises InputError where the variant is unknown or lacks its transport.
     """
     require_variant(variant, transport)
-    x, y = footprint(model)
-    if variant == "dynamic" and transport is not None:
-        b = transport.whole(a, transport.settled(a) if wake is None else wake)
-        flow = jnp.einsum("nmk,km->n", transported_flow(model, transport, motion.plane, x, y), b)
-    else:
-        flow = a @ rotor_on_ground(model.modes, motion.plane, x, y)
-    return flow if variant == "static" else flow + plane_velocity(motion, inputs.mu, inputs.climb, x)
+    flow = _rotor_flow(a, motion, model, variant, transport, wake)
+    return flow + _plane_flow(motion, inputs, model, variant)
+
+
+def _rotor_flow(a, motion, model, variant, transport, wake) -> Float[Array, " N"]:
+    if variant != "dynamic" or transport is None:
+        return a @ rotor_into_ground(model, motion.plane)
+    b = transport.whole(a, transport.settled(a) if wake is None else wake)
+    x, y = footprint(model, motion.plane)
+    return jnp.einsum("nmk,km->n", transported_flow(model, transport, motion.plane, x, y), b)
+
+
+def _plane_flow(motion, inputs, model, variant) -> Float[Array, " N"]:
+    x, _ = footprint(model, motion.plane)
+    return jnp.zeros_like(x) if variant == "static" else plane_velocity(motion, inputs.mu, inputs.climb, x)
 
 
 @eqx.filter_jit
@@ -149,9 +163,16 @@ def ground_states(
     transport: WakeTransport | None = None,
     wake: Float[Array, "K M"] | None = None,
 ) -> Float[Array, " G"]:
-    """Return the source states c that close the moving plane, as `flow_into_plane` sees it."""
-    solver = source_solver(model.sources, model.quadrature, model.region, model.ground_radius)
-    return solver @ flow_into_plane(a, motion, inputs, model, variant, transport, wake)
+    """Return the source states c that close the moving plane, as `flow_into_plane` sees it.
+
+    "printed" strengths answer the rotor's flow as printed, the plane's own motion in full.
+    """
+    require_variant(variant, transport)
+    row, column = strength_factors(model)
+    carried = None if wake is None else wake * column
+    flow = _rotor_flow(a * column, motion, model, variant, transport, carried)
+    solver = closing(model, motion.plane)
+    return row * (solver @ flow) + solver @ _plane_flow(motion, inputs, model, variant)
 
 
 @eqx.filter_jit
@@ -166,4 +187,5 @@ def residual(
     wake: Float[Array, "K M"] | None = None,
 ) -> Float[Array, ""]:
     """Return the rms of the normal velocity that c leaves on the moving plane over that of the flow into it."""
-    return relative_residual(c, flow_into_plane(a, motion, inputs, model, variant, transport, wake), model)
+    into = flow_into_plane(a, motion, inputs, model, variant, transport, wake)
+    return relative_residual(c, into, model, motion.plane)

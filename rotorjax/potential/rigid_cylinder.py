@@ -8,24 +8,21 @@ out:
 
     w = Σ a [Φ(0) − 2 (patch) + (reflected sink disk)];   level ground: w = Σ a [Φ(0) − 2Φ(h) + Φ(2h)].
 
-For a level plane the patch is Φ(h); on a slope its points (x, y) lie at the depth h − x tan δ and its flow is
-integrated over the patch. The one approximation on a slope is that the wake stays a vertical cylinder down to the
-plane; no flow condition is approximated. The states and the model are those of `rotorjax.potential.model`; its
-correction does not enter.
+For a level plane the patch is Φ(h), at any height; on a slope its points (x, y) lie at the depth h − x tan δ and what
+that adds to the flow is integrated over the patch. The one approximation on a slope is that the wake stays a vertical
+cylinder down to the plane; no flow condition is approximated. The states and the model are those of
+`rotorjax.potential.model`; its correction and its wake's contraction do not enter.
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.potential.field import disk_functions, velocity_functions
-from rotorjax.potential.ground_source import DiskQuadrature, depth
+from rotorjax.potential.ground_source import SHEET, DiskQuadrature, sheet_flow
 from rotorjax.potential.model import FiniteState, FiniteStateModel
-
-PATCH = DiskQuadrature(40, 64)  # 1e-6 while the nearest point of the plane is at least 0.3 R below the disk
 
 
 def _on_disk(state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel) -> Array:
@@ -33,19 +30,10 @@ def _on_disk(state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], m
 
 
 def patch_upflow(
-    state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel, patch: DiskQuadrature = PATCH
+    state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel, patch: DiskQuadrature = SHEET
 ) -> Float[Array, "*N"]:
     """Return the upward velocity (over ΩR) of the source patch without its image, at hub-frame points off the plane."""
-    ground = _ground(model)
-    x, y, nu, weights = (jnp.asarray(v, points.dtype) for v in patch.rule())
-    strength = _on_disk(state, x, y, model) * nu * weights  # μ dA/4π with dA = 2π ν dν dψ/2π
-    z = -depth(ground, x)
-
-    def one(point: Array) -> Array:
-        dx, dy, dz = point[0] - x, point[1] - y, point[2] - z
-        return strength @ (dz * (dx * dx + dy * dy + dz * dz) ** -1.5)
-
-    return jax.lax.map(one, points.reshape(-1, 3), batch_size=256).reshape(points.shape[:-1])
+    return jnp.tensordot(state.a, sheet_flow(model.modes, _ground(model), points, patch), 1)
 
 
 def reflected_sink_downflow(
@@ -74,11 +62,11 @@ def inflow(
     r: Float[Array, " R"],
     psi: Float[Array, " K"],
     model: FiniteStateModel,
-    patch: DiskQuadrature = PATCH,
+    patch: DiskQuadrature = SHEET,
 ) -> Float[Array, "K R"]:
     """Return λ over ΩR, positive down, at radii r (over R) and azimuths psi (rad), with the exact image of the wake.
 
-    patch: quadrature over the source patch; finer where the plane comes closer to the disk than 0.3 R.
+    patch: quadrature of what the patch's tilt adds; finer where a slope comes closer to the disk than 0.3 R.
     """
     x, y = r[None, :] * jnp.cos(psi)[:, None], r[None, :] * jnp.sin(psi)[:, None]
     return disk_inflow(state, x, y, model, patch)
@@ -89,7 +77,7 @@ def disk_inflow(
     x: Float[Array, "*N"],
     y: Float[Array, "*N"],
     model: FiniteStateModel,
-    patch: DiskQuadrature = PATCH,
+    patch: DiskQuadrature = SHEET,
 ) -> Float[Array, "*N"]:
     """Return λ over ΩR, positive down, at hub-frame stations (x, y) of the disk, over R."""
     down = _on_disk(state, x, y, model)
@@ -101,7 +89,7 @@ def disk_inflow(
 
 
 @eqx.filter_jit
-def mean_inflow(state: FiniteState, model: FiniteStateModel, patch: DiskQuadrature = PATCH) -> Float[Array, ""]:
+def mean_inflow(state: FiniteState, model: FiniteStateModel, patch: DiskQuadrature = SHEET) -> Float[Array, ""]:
     """Return the area-weighted mean of λ over the whole disk, over ΩR."""
     x, y, nu, weights = (jnp.asarray(v, state.a.dtype) for v in model.quadrature.rule())
     return (2 * nu * weights) @ disk_inflow(state, x, y, model, patch)

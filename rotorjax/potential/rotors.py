@@ -2,9 +2,10 @@
 
 Every rotor has the states of `rotorjax.potential.dynamics` in its own frame; for one that turns clockwise that frame is
 mirrored in y, so that its blades run along rising azimuth too. Another rotor's flow adds to the air that passes a disk:
-the mass flow is V_T = |λ| and V̄ = λ + λ_i with λ = climb + own mean inflow λ_i + mean of what the others induce there.
+the mass flow is V_T = |λ| and V̄ = λ + λ_i with λ = climb + own mean inflow λ_i + mean of what the others induce there;
+λ_i has the own ground's answer in it where the model counts that in.
 Two rotors at one place so share their flow, and one far below another climbs in its far wake. Wakes are straight along
-their own rotor's axis, do not contract, and reach the others at once. Over ground each rotor's sources close the plane
+their own rotor's axis and reach the others at once. Over ground each rotor's sources close the plane
 to its own wake, and act on all rotors.
 """
 
@@ -19,8 +20,7 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.potential.dynamics import rate_table
-from rotorjax.potential.field import disk_functions, field_functions
-from rotorjax.potential.model import FiniteStateModel, ground_matrix, ground_upflow
+from rotorjax.potential.model import FiniteStateModel, ground_matrix, ground_upflow, rotor_means, rotor_velocity
 
 
 class Rotors(eqx.Module):
@@ -126,9 +126,9 @@ def _flow_of(
 ) -> Float[Array, "3 M N"]:
     """Velocity in the common frame of one rotor's unit states at points, the answer of its ground included."""
     own = (points - place) @ frame
-    flow = field_functions(model.modes, own)
-    if ground is not None:
-        seen = _under(ground, place)
+    seen = None if ground is None else _under(ground, place)
+    flow = rotor_velocity(model, seen, own)
+    if seen is not None:
         upward = ground_matrix(model, seen).T @ ground_upflow(model, seen, own)
         flow = flow.at[2].add(upward)
     return jnp.einsum("ab,bmn->amn", frame, flow)
@@ -151,22 +151,14 @@ def _area(model: FiniteStateModel) -> Float[Array, " N"]:
     return jnp.asarray(2 * nu * weights)
 
 
-def _own(system: Rotors) -> Float[Array, " M"]:
-    """Mean inflow of each own state, the ground left out as in the paper's mass flow."""
-    x, y, _, _ = (jnp.asarray(v) for v in system.model.quadrature.rule())
-    return disk_functions(system.model.modes, x, y) @ _area(system.model)
-
-
 def mass_flows(a: Float[Array, "B M"], climb: Float[Array, " B"], system: Rotors) -> Float[Array, "B M"]:
     """Return the diagonals of V of all rotors."""
-    modes = system.model.modes
-    passing = jnp.einsum("n,ijnm,jm->ij", _area(system.model), system.inflow, a)
+    model = system.model
+    passing = jnp.einsum("n,ijnm,jm->ij", _area(model), system.inflow, a)
     others = jnp.sum(passing * (1 - jnp.eye(len(a))), axis=1)
-    induced = a @ _own(system)
+    induced = jnp.diag(passing) if model.ground_in_mass_flow else a @ rotor_means(model, None)
     through = climb + induced + others
-    speed = jnp.abs(through)
-    later = speed if system.model.mass_flow == "linear" else jnp.abs(through + induced)
-    return jnp.where(np.arange(len(modes)) == modes.index(0, 1), speed[:, None], later[:, None])
+    return jnp.where(model.varying, jnp.abs(through + induced)[:, None], jnp.abs(through)[:, None])
 
 
 def rates(

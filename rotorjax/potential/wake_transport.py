@@ -9,7 +9,8 @@ b(s, ψ) the rotor's states and q(s, ψ) the loading per mass flow of that momen
 Integrated by parts the last term is P̄ q(d) − Φ(d) q(0) − ∫₀^d Φ(s) q'(d − s) ds: for steady loads 2P̄ − Φ(d) (Eq. 32) at
 once. It is the linear flow, causal and without costates; the equation of the rotor gives q = b − ρ D⁻¹M ∂b/∂s
 with ρ = V_T/V, so b alone is carried, at Chebyshev nodes of the depth. ρ is taken in hover (1, and ½ for the states
-that the paper's mass flow halves): exact for "linear" mass flow, and for "paper" without climb.
+that V̄ carries): exact for "linear" mass flow, and without climb. A contracted wake is carried as the cylinder of its
+radius, at the disk's V_T: what it gains in speed is left out.
 """
 
 from functools import cache
@@ -24,7 +25,7 @@ from rotorjax.ground import Plane
 from rotorjax.potential.field import disk_functions, pressure_functions
 from rotorjax.potential.ground_source import depth
 from rotorjax.potential.matrices import apparent_mass, damping
-from rotorjax.potential.model import FiniteStateModel
+from rotorjax.potential.model import FiniteStateModel, wake_over
 from rotorjax.potential.modes import ModeTable
 
 _GAUSS = 16  # nodes of the acceleration's integral over the way down
@@ -93,10 +94,9 @@ def wake_transport(length: float, nodes: int = 12) -> WakeTransport:
 
 
 @cache
-def _loading_lag(modes: ModeTable, mass_flow: str) -> np.ndarray:
+def _loading_lag(modes: ModeTable, varying: tuple[bool, ...]) -> np.ndarray:
     """ρ D⁻¹M: what q lags behind b, for each unit of ∂b/∂s, (M, M)."""
-    ratio = np.full(len(modes), 1.0 if mass_flow == "linear" else 0.5)
-    ratio[modes.index(0, 1)] = 1.0
+    ratio = np.where(varying, 0.5, 1.0)
     return ratio[:, None] * np.linalg.solve(damping(modes, modes), apparent_mass(modes, modes))
 
 
@@ -111,23 +111,26 @@ def transported_flow(
 
     Summed over the nodes it is `ground_source.rotor_on_ground` for pressure modes.
     """
-    modes, d = model.modes, depth(ground, x)
-    at_foot = disk_functions(modes, x, y).T  # (N, M)
+    modes, d, wake = model.modes, depth(ground, x), wake_over(model, ground)
+    radius = 1.0 if wake is None else wake.radius  # a contracted wake is the cylinder of its radius
+    at_foot = disk_functions(modes, x / radius, y / radius).T  # (N, M)
     arrival, on_disk = transport.weights(d), transport.weights(jnp.zeros_like(d))
     node, weight = np.polynomial.legendre.leggauss(_GAUSS)
     heights = d[:, None] * jnp.asarray((node + 1) / 2, x.dtype)  # (N, J)
     above = jnp.stack([*(jnp.broadcast_to(v[:, None], heights.shape) for v in (x, y)), heights], axis=-1)
     between = jnp.einsum(
         "mnj,n,j,njk->nmk",
-        pressure_functions(modes, above),
+        pressure_functions(modes, above / radius),
         d,
         jnp.asarray(weight / 2, x.dtype),
         transport.weights(d[:, None] - heights) @ jnp.asarray(transport.slope, x.dtype),
     )
-    mirror = pressure_functions(modes, jnp.stack([x, y, d], axis=-1)).T
+    mirror = pressure_functions(modes, jnp.stack([x, y, d], axis=-1) / radius).T
     carried = at_foot[:, :, None] * arrival[:, None, :]
     loaded = carried - mirror[:, :, None] * on_disk[:, None, :] - between
     loaded = jnp.where(modes.odd[None, :, None], loaded, 0.0)
-    lag, slope = (jnp.asarray(v, x.dtype) for v in (_loading_lag(modes, model.mass_flow), transport.slope))
+    lag, slope = (
+        jnp.asarray(v, x.dtype) for v in (_loading_lag(modes, tuple(model.varying.tolist())), transport.slope)
+    )
     lagged = jnp.einsum("nmj,mp,jk->npk", loaded, lag, slope)
     return jnp.cos(ground.slope) * (carried + loaded - lagged)

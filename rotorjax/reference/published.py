@@ -137,6 +137,30 @@ def cheeseman_bennett(height: float) -> float:
     return (1 - (1 / (4 * height)) ** 2) ** 1.5
 
 
+@cache
+def _curve(name: str, column: str) -> tuple[np.ndarray, np.ndarray]:
+    rows = _rows(name)
+    return tuple(np.array([float(row[key]) for row in rows]) for key in ("h_over_R", column))  # type: ignore[return-value]
+
+
+def model_rotors(height: float) -> float:
+    """Measured inflow of isolated model rotors over that out of ground effect, at the same thrust; height: over R.
+
+    NACA TN 835 and USAAMRDL TR 72-4, as reduced by Prouty. The curve ends at 2.2 R with 0.982; beyond, 1 less it falls
+    as 1/h².
+    """
+    heights, ratio = _curve("ground_effect_model_rotors.csv", "v_ratio_constant_thrust")
+    if height > heights[-1]:
+        return float(1 - (1 - ratio[-1]) * (heights[-1] / height) ** 2)
+    return float(np.interp(height, heights, ratio))
+
+
+def computed_ground_model(height: float) -> float:
+    """Peters' computed induced power ratio over ground (J. AHS 54(1) 011001, fig. 16); NaN above 2 R."""
+    heights, ratio = _curve("ground_effect_computed.csv", "kG")
+    return float(np.interp(height, heights, ratio, right=np.nan))
+
+
 def step_response(
     psi: Float[np.ndarray, " N"], inflow: float, solidity: float, mass: float = MASS
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:

@@ -11,13 +11,16 @@ from rotorjax.study.slope_claims import SLOPE_CLAIMS
 
 
 def paper_claims(reading: Reading) -> list[Claim]:
-    """Every claim of the paper's results section with its verdict."""
-    return [Claim(where, text, *judge(reading)) for where, text, judge in (*LEVEL_CLAIMS, *SLOPE_CLAIMS)]
+    """Every claim of the paper's results section with its verdict, for the default model and for the paper's own."""
+    return [
+        Claim(where, text, *judge(reading), *judge(reading.as_printed))
+        for where, text, judge in (*LEVEL_CLAIMS, *SLOPE_CLAIMS)
+    ]
 
 
 def checks(reading: Reading) -> list[Claim]:
     """Physical checks of the free wake and the VPBFSM, independent of the paper."""
-    return [Claim(where, text, *judge(reading)) for where, text, judge in CHECKS]
+    return [Claim(where, text, *judge(reading), *judge(reading.as_printed)) for where, text, judge in CHECKS]
 
 
 def hovers(reading: Reading) -> Verdict:
@@ -51,7 +54,7 @@ def tilts_grow(reading: Reading) -> Verdict:
     if not cases:
         return MISSING
     names, holds, parts = [f"{case.slope_deg:g}°" for case in cases], True, []
-    for model, title in (("free_wake", "free wake"), ("vpbfsm", "VPBFSM")):
+    for model, title in (("free_wake", "free wake"), (reading.ours, "VPBFSM")):
         tilt = [reading.tilt(case, model) for case in cases]
         holds &= tilt[0] > 0 and falls([-t for t in tilt])
         parts.append(f"{title} {listed(names, tilt)}")

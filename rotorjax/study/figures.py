@@ -54,6 +54,7 @@ def profile(data: xr.Dataset, model: str, reference: float) -> tuple[np.ndarray,
     radius, inflow = {
         "free_wake": ("radius", "free_wake_inflow"),
         "vpbfsm": ("grid_radius", "vpbfsm_inflow_grid"),
+        "printed": ("grid_radius", "printed_inflow_diameter"),
         "exact_image": ("grid_radius", "exact_image_inflow_diameter"),
     }[model]
     return data[radius].to_numpy(), data[inflow].to_numpy() / reference
@@ -123,7 +124,7 @@ def inflow_of(case: Case, title: str) -> Draw:
             return None
         figure = new_figure()
         axes = figure.add_subplot()
-        for model in ("free_wake", "vpbfsm") + (("exact_image",) if case.height is not None else ()):
+        for model in ("free_wake", "vpbfsm", "printed") + (("exact_image",) if case.height is not None else ()):
             look = dict(MODEL_STYLE[model])
             if case.height is None and model == "vpbfsm":
                 look["label"] = "VPBFSM, three pressure terms"

@@ -42,9 +42,9 @@ def loading_matches(reading: Reading) -> Verdict:
 
 def three_terms(reading: Reading) -> Verdict:
     """Three terms are the fewest that match the inflow."""
-    if not reading.has(OGE) or "inflow_rms_difference_by_terms" not in reading.merged:
+    if not reading.has(OGE) or f"{reading.ours}_rms_difference_by_terms" not in reading.merged:
         return MISSING
-    rms = reading.merged["inflow_rms_difference_by_terms"].to_numpy()
+    rms = reading.merged[f"{reading.ours}_rms_difference_by_terms"].to_numpy()
     text = "rms difference by number of terms: " + listed(
         [str(n) for n in reading.merged["terms"].to_numpy()], list(rms)
     )
@@ -52,16 +52,16 @@ def three_terms(reading: Reading) -> Verdict:
 
 
 def close_at(case: Case) -> Callable[[Reading], Verdict]:
-    """The printed factor agrees with the free wake in one case."""
+    """The VPBFSM agrees with the free wake in one case."""
 
     def judge(reading: Reading) -> Verdict:
         if not reading.has(case):
             return MISSING
-        paper, exact = (reading.number(case, f"{m}_inflow_rms_difference") for m in ("vpbfsm", "exact_image"))
-        means = [reading.mean(case, m) for m in ("free_wake", "vpbfsm", "exact_image")]
-        text = f"rms difference {paper:.3f} with the printed factor, {exact:.3f} with the exact image; mean inflow "
-        text += listed(["free wake", "printed factor", "exact image"], means)
-        return paper <= GOOD_AGREEMENT, text
+        ours, exact = (reading.number(case, f"{m}_inflow_rms_difference") for m in (reading.ours, "exact_image"))
+        means = [reading.mean(case, m) for m in ("free_wake", reading.ours, "exact_image")]
+        text = f"rms difference {ours:.3f} ({exact:.3f} with the exact image of a cylinder); mean inflow "
+        text += listed(["free wake", "VPBFSM", "exact image"], means)
+        return ours <= GOOD_AGREEMENT, text
 
     return judge
 
@@ -72,16 +72,16 @@ def inflow_falls(reading: Reading) -> Verdict:
     if not reading.has(*cases) or len(cases) < 3:
         return MISSING
     names = [case.label for case in cases]
-    free, ours = ([reading.mean(case, m) for case in cases] for m in ("free_wake", "vpbfsm"))
+    free, ours = ([reading.mean(case, m) for case in cases] for m in ("free_wake", reading.ours))
     return falls(free) and falls(ours), f"free wake {listed(names, free)}; VPBFSM {listed(names, ours)}"
 
 
 def all_heights(reading: Reading) -> Verdict:
-    """The printed factor follows the free wake over every height."""
+    """The VPBFSM follows the free wake over every height."""
     cases = reading.level()
     if len(cases) < 2:
         return MISSING
-    rms = [reading.number(case, "vpbfsm_inflow_rms_difference") for case in cases]
+    rms = [reading.number(case, f"{reading.ours}_inflow_rms_difference") for case in cases]
     return max(rms) <= GOOD_AGREEMENT, "rms difference " + listed([c.label for c in cases], rms)
 
 
@@ -93,7 +93,7 @@ def tip_is_smoother(reading: Reading) -> Verdict:
     outer = reading.r >= 0.8
     steepness = [
         float(np.mean([np.max(np.abs(np.diff(reading.inflow(c, m)[0][outer], 2))) for c in cases]))
-        for m in ("free_wake", "vpbfsm")
+        for m in ("free_wake", reading.ours)
     ]
     text = "largest second difference between stations beyond 0.8 R, mean of the cases: "
     return steepness[0] > steepness[1], text + listed(["free wake", "VPBFSM"], steepness)
@@ -105,7 +105,7 @@ def ground_condition(reading: Reading) -> Verdict:
     if not cases:
         return MISSING
     free = max(reading.number(case, "free_wake_ground_normal_velocity_rms") for case in cases)
-    ours = max(reading.number(case, "vpbfsm_ground_normal_velocity_rms") for case in cases)
+    ours = max(reading.number(case, f"{reading.ours}_ground_normal_velocity_rms") for case in cases)
     text = f"largest rms: free wake {free:.1e} of √(C_T/2); VPBFSM {100 * ours:.1f} % of the incoming flow"
     return free <= 1e-10 and ours <= 0.03, text
 

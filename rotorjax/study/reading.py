@@ -1,6 +1,6 @@
 """Numbers read off the merged data set: means, sides, extremes; what claims and report quote."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,9 +13,18 @@ from rotorjax.bench.record import COMPARED, rms_difference
 
 @dataclass(frozen=True)
 class Reading:
-    """The merged data set with questions to ask it. Inflow is over the free wake's mean out of ground effect."""
+    """The merged data set with questions to ask it. Inflow is over the free wake's mean out of ground effect.
+
+    ours: which finite-state model is asked about, "vpbfsm" (the default choices) or "printed" (the paper's own).
+    """
 
     merged: xr.Dataset
+    ours: str = "vpbfsm"
+
+    @property
+    def as_printed(self) -> "Reading":
+        """The same questions about the paper's own model."""
+        return replace(self, ours="printed")
 
     @property
     def reference(self) -> float:
@@ -61,7 +70,7 @@ class Reading:
         return self.merged[name].sel(case=case.name).to_numpy()
 
     def inflow(self, case: Case, model: str) -> np.ndarray:
-        """Normalised inflow at the stations, (K, R); model: free_wake, vpbfsm or exact_image."""
+        """Normalised inflow at the stations, (K, R); model: free_wake, vpbfsm, printed or exact_image."""
         return self.field(case, f"{model}_inflow") / self.reference
 
     def mean(self, case: Case, model: str) -> float:

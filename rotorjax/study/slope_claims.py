@@ -36,7 +36,7 @@ def closer_on_valley(*cases: Case) -> Callable[[Reading], Verdict]:
             return MISSING
         verdicts, parts = [], []
         for case in cases:
-            valley, mountain = (reading.side_rms(case, "vpbfsm", mountain=m) for m in (False, True))
+            valley, mountain = (reading.side_rms(case, reading.ours, mountain=m) for m in (False, True))
             verdicts.append(valley <= GOOD_AGREEMENT and valley < mountain)
             parts.append(f"{case.label}: valley {valley:.3f}, mountain {mountain:.3f}")
         return all(verdicts), "rms difference by half of the disk: " + "; ".join(parts)
@@ -98,7 +98,7 @@ def sides_part(reading: Reading) -> Verdict:
     if len(cases) < 3 or cases[0].slope_deg:
         return MISSING
     names, holds, parts = [f"{case.slope_deg:g}°" for case in cases], True, []
-    for model, title in (("free_wake", "free wake"), ("vpbfsm", "VPBFSM")):
+    for model, title in (("free_wake", "free wake"), (reading.ours, "VPBFSM")):
         mountain, valley = ([reading.side(case, model, mountain=m) for case in cases] for m in (True, False))
         holds &= falls(mountain) and falls([-v for v in valley])
         parts.append(f"{title}, mountain side {listed(names, mountain)}; valley side {listed(names, valley)}")
@@ -110,13 +110,15 @@ def agrees_on_slopes(reading: Reading) -> Verdict:
     cases = [case for case in reading.slopes() if case.slope_deg]
     if len(cases) < 2:
         return MISSING
-    tilts = {model: [reading.tilt(case, model) for case in cases] for model in ("free_wake", "vpbfsm", "exact_image")}
+    tilts = {
+        model: [reading.tilt(case, model) for case in cases] for model in ("free_wake", reading.ours, "exact_image")
+    }
     names = [f"{case.slope_deg:g}°" for case in cases]
-    same = all((a > 0) == (b > 0) for a, b in zip(tilts["free_wake"], tilts["vpbfsm"], strict=True))
-    slight = all(abs(a - b) <= GOOD_AGREEMENT for a, b in zip(tilts["free_wake"], tilts["vpbfsm"], strict=True))
+    same = all((a > 0) == (b > 0) for a, b in zip(tilts["free_wake"], tilts[reading.ours], strict=True))
+    slight = all(abs(a - b) <= GOOD_AGREEMENT for a, b in zip(tilts["free_wake"], tilts[reading.ours], strict=True))
     text = "valley less mountain side: " + "; ".join(
         f"{title} {listed(names, tilts[model])}"
-        for model, title in (("free_wake", "free wake"), ("vpbfsm", "VPBFSM"), ("exact_image", "exact image"))
+        for model, title in (("free_wake", "free wake"), (reading.ours, "VPBFSM"), ("exact_image", "exact image"))
     )
     return same and slight, text
 

@@ -6,6 +6,7 @@ from rotorjax.checks import closest
 from rotorjax.errors import InputError
 from rotorjax.validation import (
     caradonna_tung,
+    finite_state,
     grid,
     ground,
     heave,
@@ -18,7 +19,7 @@ from rotorjax.validation import (
 )
 from rotorjax.validation.case import Subject, ValidationCase
 
-_ALL = (caradonna_tung, polars, momentum, landgrebe, ground, step, march, heave, inflow_map, grid)
+_ALL = (caradonna_tung, polars, momentum, landgrebe, ground, finite_state, step, march, heave, inflow_map, grid)
 CASES = {module.CASE.name: module.CASE for module in _ALL}
 MEASURED = (caradonna_tung.NAME, polars.NAME, inflow_map.NAME)
 QUICK = (caradonna_tung.NAME, momentum.NAME, ground.NAME)

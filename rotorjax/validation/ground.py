@@ -1,4 +1,8 @@
-"""Level ground: inflow at constant thrust against the measured curve and Hayden's, thrust, and where the wake goes."""
+"""Level ground: induced power at constant thrust against the measured curve and Hayden's, thrust, where the wake goes.
+
+What tests near the ground measure is thrust and torque: their ratio v_IGE/v_OGE is that of induced power at the same
+thrust, ∫ λ dC_T over C_T^1.5. The mean inflow at the blades over √C_T, which leaves the loading out, stands beside it.
+"""
 
 from itertools import pairwise
 
@@ -17,8 +21,8 @@ from rotorjax.wake.solution import Solution
 
 NAME = "ground"
 HEIGHTS, QUICK = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0), (1.0, 2.0)
-NEAR = 1.0
-"""Height over R up to which the tip vortex has to run out along the ground."""
+NEAR = 0.75
+"""Height over R up to which two free turns come to where the tip vortex runs out along the ground."""
 MARGIN = 0.04
 ISOLATED = Against(
     "isolated model rotors (NACA TN 835 and others, as reduced by Prouty)",
@@ -58,13 +62,13 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
 
 
 def rows(subject: Subject, wakes: Wakes) -> list[Row]:
-    """Inflow ratio at each height, C_T rising all the way down, nodes above the ground, tip vortex along it."""
+    """Power ratio at each height, C_T rising all the way down, nodes above the ground, tip vortex along it."""
     return [row for free in _free(subject) for row in _rows_of(free, _grounded(subject, free), wakes)]
 
 
 def _rows_of(free: Point, grounded: tuple[Point, ...], wakes: Wakes) -> list[Row]:
     alone, where = wakes[free], f"{free.rotor} at {free.collective_deg:g}°"
-    found = [_ratio_row(at, inflow_ratio(wakes[at], alone), where) for at in reversed(grounded) if _limits(at)]
+    found = [_ratio_row(at, wakes[at], alone, where) for at in reversed(grounded) if _limits(at)]
     least = min(b - a for a, b in pairwise([alone.CT, *(wakes[at].CT for at in grounded)]))
     lowest = min(clearance(wakes[at]) for at in grounded)
     rise = "least rise of C_T to the next lower height at constant collective"
@@ -74,13 +78,18 @@ def _rows_of(free: Point, grounded: tuple[Point, ...], wakes: Wakes) -> list[Row
     return found + [_spread(at, wakes[at], where) for at in reversed(grounded) if _height(at) <= NEAR]
 
 
+def power_ratio(near: Solution, alone: Solution) -> float:
+    """Induced power over C_T^1.5 near the ground over the same far from it: the ratio at constant thrust."""
+    return float(near.CP_induced / near.CT**1.5 / (alone.CP_induced / alone.CT**1.5))
+
+
 def inflow_ratio(near: Solution, alone: Solution) -> float:
     """Mean inflow over √C_T near the ground over the same far from it: the ratio at constant thrust."""
     return float(near.mean_inflow / np.sqrt(near.CT) / (alone.mean_inflow / np.sqrt(alone.CT)))
 
 
 def _limits(at: Point) -> Limits | None:
-    """Where the inflow ratio has to lie: about the measured curve; of a helicopter's rotor, up to Hayden's as well."""
+    """Where the power ratio has to lie: about the measured curve; of a helicopter's rotor, up to Hayden's as well."""
     measured, flown = reference.isolated_rotors(_height(at)), reference.hayden(_height(at))
     if measured is None or not flies(at.rotor):
         return None if measured is None else absolute(MARGIN, measured)
@@ -93,12 +102,17 @@ def flies(rotor: str) -> bool:
     return catalogue.load(rotor)[0].hinge is not None
 
 
-def _ratio_row(at: Point, ours: float, where: str) -> Row:
+def _ratio_row(at: Point, near: Solution, alone: Solution, where: str) -> Row:
     limits, height = _limits(at), _height(at)
     assert limits is not None
-    others = f"Hayden {reference.hayden(height):.3f}, Cheeseman-Bennett {reference.cheeseman_bennett(height):.3f}"
-    name = f"inflow at constant thrust over OGE, h = {height:g}, {where} ({others})"
-    return Row(NAME, name, ours, limits, FUSELAGE if flies(at.rotor) else ISOLATED)
+    beside = {
+        "mean inflow": inflow_ratio(near, alone),
+        "Hayden": reference.hayden(height),
+        "Cheeseman-Bennett": reference.cheeseman_bennett(height),
+    }
+    others = ", ".join(f"{name} {value:.3f}" for name, value in beside.items())
+    name = f"induced power at constant thrust over OGE, h = {height:g}, {where} ({others})"
+    return Row(NAME, name, power_ratio(near, alone), limits, FUSELAGE if flies(at.rotor) else ISOLATED)
 
 
 def _spread(at: Point, solution: Solution, where: str) -> Row:
@@ -112,24 +126,24 @@ def _height(at: Point) -> float:
 
 
 def draw(subject: Subject, wakes: Wakes) -> Figure:
-    """Inflow ratio and thrust ratio of each rotor over height, and the first one's tip vortices."""
+    """Power ratio and thrust ratio of each rotor over height, and the first one's tip vortices."""
     fine = np.linspace(0.5, 3.0, 101)
     with style():
         figure = new_figure(11.0, 3.8)
-        inflow, thrust, paths = figure.subplots(1, 3, width_ratios=(1, 1, 1.3))
+        power, thrust, paths = figure.subplots(1, 3, width_ratios=(1, 1, 1.3))
         for free, marker in zip(_free(subject), "os^", strict=False):
             grounded, alone = _grounded(subject, free), wakes[free]
             heights = [_height(at) for at in grounded]
             look = {"marker": marker, "color": FREE_WAKE, "label": f"free wake, {free.rotor}"}
-            inflow.plot(heights, [inflow_ratio(wakes[at], alone) for at in grounded], **look)
+            power.plot(heights, [power_ratio(wakes[at], alone) for at in grounded], **look)
             thrust.plot(heights, [wakes[at].CT / alone.CT for at in grounded], **look)
         measured = fine[[reference.isolated_rotors(h) is not None for h in fine]]
-        inflow.plot(measured, [reference.isolated_rotors(h) for h in measured], color=VPBFSM, label="isolated rotors")
-        inflow.plot(fine, [reference.hayden(h) for h in fine], color=VPBFSM, ls=":", label="Hayden, with fuselage")
+        power.plot(measured, [reference.isolated_rotors(h) for h in measured], color=VPBFSM, label="isolated rotors")
+        power.plot(fine, [reference.hayden(h) for h in fine], color=VPBFSM, ls=":", label="Hayden, with fuselage")
         other = [reference.cheeseman_bennett(h) for h in fine]
-        inflow.plot(fine, other, color=INK, ls="--", label="Cheeseman & Bennett")
-        inflow.set(xlabel=r"$h/R$", ylabel="mean inflow at constant thrust over OGE")
-        inflow.legend(loc="lower right")
+        power.plot(fine, other, color=INK, ls="--", label="Cheeseman & Bennett")
+        power.set(xlabel=r"$h/R$", ylabel="induced power at constant thrust over OGE")
+        power.legend(loc="lower right")
         thrust.axhline(1, color=INK, lw=0.8)
         thrust.set(xlabel=r"$h/R$", ylabel=r"$C_T$ over OGE, constant collective")
         grounded = _grounded(subject, _free(subject)[0])
@@ -151,7 +165,10 @@ def _free(subject: Subject) -> tuple[Point, ...]:
 
 
 KNOWN = (
-    "At h = 1 the tip vortex has contracted and runs out again, but its two free turns end before it has passed the "
-    "rim; the turns that repeat the last one go on from there."
+    "At h = 0.75 and below the ground takes too much: at h = 0.5 induced power falls to 0.50 to 0.60 where isolated "
+    "rotors have 0.72, Hayden 0.625 and Cheeseman and Bennett 0.650. The free turns are a part of it at h = 1 (grid "
+    "case: 1 % of C_T) and none above. Most likely it is the inner sheet: in an earlier trial three or four inboard "
+    "filaments in place of two had a mean inflow over √C_T of 0.71 and 0.79 at h = 0.5 and 0.75, but most such wakes "
+    "were lost on the way down (docs/free_wake.md). Two blades at h = 1 are out by 0.003."
 )
 CASE = ValidationCase(NAME, "Level ground", points, compare, KNOWN)

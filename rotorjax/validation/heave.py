@@ -31,7 +31,7 @@ SIZE, MARCHED = 0.002, 0.5
 OTHER = 1 - reference.OTHER_MASS / reference.MASS
 LAG_DEG = float(np.rad2deg(np.arctan((1 - OTHER) ** -0.5) - np.arctan((1 - OTHER) ** 0.5)))
 """The most that the phase of a first-order lag changes where its mass is less by OTHER."""
-SOURCE = "VPBFSM, dynamic ground, printed factor, the same rotor, collective and sections"
+SOURCE = "VPBFSM, dynamic ground, the same rotor, collective and sections"
 INFLOW = Against(
     SOURCE,
     f"{100 * OTHER:.0f} %: the other apparent mass in use, 0.543 (Pitt & Peters 1981), is so much less; {LAG_DEG:.0f}° "

@@ -19,8 +19,7 @@ from scipy.signal import resample
 
 from rotorjax.bench.plotting import new_figure, polar_contour, shared_levels, style
 from rotorjax.inflow.finite_state import FiniteStateInflow
-from rotorjax.potential.dynamics import with_ground
-from rotorjax.potential.model import velocity
+from rotorjax.potential.model import velocity, with_ground
 from rotorjax.rotor.geometry import chord
 from rotorjax.trim import run as trimming
 from rotorjax.trim.free_wake import InWake, flown

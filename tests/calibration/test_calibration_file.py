@@ -6,15 +6,16 @@ from rotorjax.calibration import taught
 from rotorjax.calibration.calibration_file import Calibration, load, save
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
+from rotorjax.potential.contraction import contraction
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 
 TAU = jnp.array([2.6e-3, 6e-4, 3e-4])
 HAYDEN = Calibration(
-    "hayden", {"b": 0.0917, "p": 1.2765}, True, 0.00355, {"loading": "elliptic", "heights": [0.5, 1.0]}
+    "hayden", {"radius": 0.7125, "clearance": 0.65}, True, 0.00355, {"loading": "elliptic", "heights": [0.5, 1.0]}
 )
 TAUGHT = Calibration(
     "freewake",
-    taught.PARAMETERS.table(jnp.asarray([1.1, 1.0, -0.5, 0.4, 3.0, 0.3])),
+    taught.PARAMETERS.table(jnp.asarray([0.8, 0.3, 0.5, 1.1, 0.9, 0.4])),
     False,
     0.12,
     {"radial_terms": 3, "source_terms": 5, "cases": ["oge", "h1"], "note": 'a "quoted" \\ name'},
@@ -27,22 +28,22 @@ def test_a_file_gives_back_what_was_saved(calibration, tmp_path):
     assert load(tmp_path / "a.toml") == calibration
 
 
-def test_hayden_sets_the_factor():
+def test_hayden_sets_the_wake():
     model = finite_state_model(plane(1.0))
     calibrated, state = HAYDEN.apply(model, TAU)
-    theirs = finite_state_model(plane(1.0), b=0.0917, p=1.2765)
+    theirs = finite_state_model(plane(1.0), wake=contraction(0.7125, clearance=0.65))
     np.testing.assert_allclose(
         mean_inflow(state, calibrated), mean_inflow(steady_state(theirs, TAU), theirs), rtol=1e-13
     )
 
 
 def test_the_taught_model_is_applied():
-    model = finite_state_model(plane(1.0))
+    model = finite_state_model(plane(1.0), ground_radial_terms=5)
     calibrated, state = TAUGHT.apply(model, TAU)
     values = taught.PARAMETERS.vector(TAUGHT.parameters)
     ours = taught.taught_model(model, values)
     np.testing.assert_array_equal(state.a, taught.taught_state(ours, TAU, values).a)
-    assert calibrated.correction.b == ours.correction.b
+    assert calibrated.wake.length == ours.wake.length
 
 
 def test_a_model_of_other_terms_is_refused():
@@ -51,14 +52,14 @@ def test_a_model_of_other_terms_is_refused():
 
 
 CHANGES = {
-    "must be for model version 1, but is for 2": ("model_version = 1", "model_version = 2"),
+    "must be for model version 2, but is for 1": ("model_version = 2", "model_version = 1"),
     "must be one of hayden, freewake, wake, but is 'other'": ('set = "hayden"', 'set = "other"'),
-    r"\[parameters\] must hold mean_gain": ('set = "hayden"', 'set = "freewake"'),
-    "must hold b, p, but holds b, q": ("p = ", "q = "),
-    "must hold b, p, but holds b, q, p": ("p = ", "q = 1.0\np = "),
-    r"\[parameters\] b must be a number in \[0.001, 1\], but is 5": ("b = 0.0917", "b = 5.0"),
-    r"\[parameters\] b must be a finite number, but is nan": ("b = 0.0917", "b = nan"),
-    r"\[parameters\] b must be a finite number, but is 'x'": ("b = 0.0917", 'b = "x"'),
+    r"\[parameters\] must hold radius, length": ('set = "hayden"', 'set = "freewake"'),
+    "must hold radius, clearance, but holds radius, q": ("clearance = ", "q = "),
+    "must hold radius, clearance, but holds radius, q, cl": ("clearance = ", "q = 1.0\nclearance = "),
+    r"\[parameters\] radius must be a number in \[0.5, 1\], but is 5": ("radius = 0.7125", "radius = 5.0"),
+    r"\[parameters\] radius must be a finite number, but is nan": ("radius = 0.7125", "radius = nan"),
+    r"\[parameters\] radius must be a finite number, but is 'x'": ("radius = 0.7125", 'radius = "x"'),
     "must have the key 'converged'": ("converged = true\n", ""),
     "did you mean 'parameters'": ("[parameters]", "[parametres]"),
     "must be TOML, but is not": ("[parameters]", "[parameters"),

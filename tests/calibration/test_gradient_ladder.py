@@ -19,6 +19,7 @@ import pytest
 from rotorjax.calibration import taught
 from rotorjax.ground import Plane, plane
 from rotorjax.potential import (
+    contraction,
     dynamics,
     ellipsoidal,
     ground_source,
@@ -31,6 +32,7 @@ from rotorjax.potential import (
 from rotorjax.potential import (
     field as flow,
 )
+from rotorjax.potential.contraction import Contraction
 from rotorjax.potential.ground_source import Correction, DiskQuadrature
 from rotorjax.potential.model import FiniteState, finite_state_model
 from rotorjax.potential.modes import ground_modes, rotor_modes
@@ -40,8 +42,10 @@ ROTOR, SOURCES = rotor_modes(1, 2), ground_modes(1, 2)
 PAIRS = ((0, 1), (0, 2), (1, 2), (1, 3))
 QUADRATURE = DiskQuadrature(8, 8)
 LEVEL = plane(1.0)
-OVER = finite_state_model(LEVEL, 1, 2, 1, 2, quadrature=QUADRATURE)
-FREE = finite_state_model(None, 1, 2, 1, 2, quadrature=QUADRATURE)
+OVER = finite_state_model(LEVEL, 1, 2, 1, 2, printed=True, strengths="closed", quadrature=QUADRATURE)
+FREE = finite_state_model(None, 1, 2, 1, 2, printed=True, quadrature=QUADRATURE)
+DEFAULT = finite_state_model(LEVEL, 1, 2, 1, 2, quadrature=QUADRATURE)
+ODD = DEFAULT.sources
 PATCH = DiskQuadrature(8, 8)
 R, WEIGHTS, PSI = jnp.array([0.3, 0.6, 0.9]), jnp.array([0.2, 0.3, 0.2]), 2 * jnp.pi / 4 * jnp.arange(4)
 LOADED = [2.6e-3, 5e-4, 1e-4, -1e-4, 2e-4, 1e-4]  # two axisymmetric, then cosine and sine for each n
@@ -90,6 +94,26 @@ def over(v):
     return eqx.tree_at(where, OVER, (ground_of(v), Correction(v[2], v[3])))
 
 
+def contracting(v):
+    """The default model over a plane (height, slope) with the wake's radius, length and clearance; the first five."""
+    return eqx.tree_at(lambda m: (m.ground, m.wake), DEFAULT, (ground_of(v), Contraction(v[2], v[3], v[4])))
+
+
+def field_of(v):
+    """Flows of a contracting wake (radius, length) at a point."""
+    wake = Contraction(v[0], v[1], jnp.asarray(0.9)).over(jnp.asarray(2.0)).in_stream(jnp.asarray(0.6))
+    above = jnp.concatenate([v[2:4], jnp.abs(v[4:])])[None]
+    return jnp.concatenate(
+        [
+            jnp.ravel(contraction.near_flow(flow.pressure_functions, ROTOR, above, wake)),
+            jnp.ravel(contraction.far_flow(flow.axial_functions, ROTOR, v[None, 2:], wake)),
+            jnp.ravel(contraction.wake_flow(flow.axial_functions, ROTOR, v[None, 2:], wake)),
+            jnp.ravel(contraction.disk_flow(ROTOR, v[2:3], v[3:4], wake)),
+            contraction.disk_means(ROTOR, wake),
+        ]
+    )
+
+
 def state_of(v) -> FiniteState:
     return FiniteState(v[:M], v[M : M + G])
 
@@ -103,6 +127,13 @@ NEAR = {
     "slope, p below 1": ([1.1, 0.3, 0.1, 0.8, *LOADED], True),
     "far ground": ([30.0, 0.0, 0.45, 2.0, *LOADED], True),
     "only the mean loaded": ([0.8, 0.1, 0.2, 1.3, 2.6e-3, 0, 0, 0, 0, 0], True),
+}
+CONTRACTING = {
+    "level, loaded": ([1.0, 0.0, 0.7, 0.2, 0.9, *LOADED], True),
+    "slope": ([1.1, 0.3, 0.8, 0.15, 0.5, *LOADED], True),
+    "far ground": ([30.0, 0.0, 0.7, 0.2, 0.9, *LOADED], True),
+    "no thrust": ([1.0, 0.1, 0.7, 0.2, 0.9, 0.0, *LOADED[1:]], False),
+    "thrust downward": ([1.0, 0.1, 0.7, 0.2, 0.9, -2.6e-3, *LOADED[1:]], True),
 }
 HELD = {
     "states": ([*STATES], True),
@@ -245,6 +276,62 @@ RUNGS = [
         GROUND,
     ),
     Rung(
+        ("ground_source.sheet_flow",),
+        lambda v: ground_source.sheet_flow(ODD, ground_of(v), v[None, 2:], QUADRATURE),
+        {
+            "ordinary": ([1.0, 0.3, 0.4, 0.2, 0.0], True),
+            "level": ([1.0, 0.0, 0.4, 0.2, 0.0], True),
+            "far": ([40.0, 0.1, 0.4, 0.2, 0.0], True),
+        },
+    ),
+    Rung(
+        (
+            "contraction.near_flow",
+            "contraction.far_flow",
+            "contraction.wake_flow",
+            "contraction.disk_flow",
+            "contraction.disk_means",
+        ),
+        field_of,
+        {
+            "above": ([0.7, 0.2, 0.4, 0.3, 0.25], True),
+            "below": ([0.7, 0.2, 0.4, 0.3, -0.15], True),
+            "axis below": ([0.8, 0.1, 0.0, 0.0, -0.5], True),
+            "hardly contracted": ([1 - 1e-6, 0.2, 0.4, 0.3, -0.2], True),
+        },
+    ),
+    Rung(
+        (
+            "model.wake_over",
+            "model.source_radius",
+            "model.closing",
+            "model.rotor_into_ground",
+            "model.mean_upflow",
+            "model.rotor_means",
+            "model.answer_means",
+            "model.rotor_flow",
+            "model.with_ground",
+        ),
+        lambda v: model.inflow(model.steady_state(contracting(v), v[5:], 0.01), R, PSI[:2], contracting(v)),
+        CONTRACTING,
+    ),
+    Rung(
+        ("model.rotor_velocity",),
+        lambda v: model.rotor_velocity(contracting(v), ground_of(v), v[None, 5:]),
+        {
+            "below": ([1.1, 0.3, 0.8, 0.15, 0.5, 0.4, 0.3, -0.2], True),
+            "above": ([1.1, 0.3, 0.8, 0.15, 0.5, 0.4, 0.3, 0.2], True),
+        },
+    ),
+    Rung(
+        ("dynamics.rotor_rate",),
+        lambda v: dynamics.rotor_rate(v[M + 3 :], inputs_of(v), DEFAULT, v[M + 2]),
+        {
+            "hover": ([*LOADED, 0.0, 0.0, 0.01, *STATES[:M]], True),
+            "climb and wind": ([*LOADED, 0.05, 0.02, 0.01, *STATES[:M]], True),
+        },
+    ),
+    Rung(
         ("matrices.influence",),
         lambda v: matrices.influence(ROTOR, ROTOR, v[0]),
         {"skewed": ([0.3], True), "straight wake": ([0.0], True)},
@@ -287,8 +374,8 @@ RUNGS = [
         HELD,
     ),
     Rung(
-        ("dynamics.rhs", "dynamics.with_ground", "dynamics.mass_flow", "dynamics.mean_induced_inflow"),
-        lambda v: dynamics.rhs(jnp.asarray(0.0), dynamics.with_ground(v[M + 2 :], OVER), inputs_of(v), OVER).a,
+        ("dynamics.rhs", "dynamics.mass_flow", "dynamics.mean_induced_inflow"),
+        lambda v: dynamics.rhs(jnp.asarray(0.0), model.with_ground(v[M + 2 :], OVER), inputs_of(v), OVER).a,
         ROTOR_INPUTS,
     ),
     Rung(
@@ -308,10 +395,10 @@ RUNGS = [
     ),
     Rung(
         ("taught.taught_model", "taught.taught_state"),
-        lambda v: taught.taught_state(taught.taught_model(over(v), v[4:10]), v[10:], v[4:10]).c,
+        lambda v: taught.taught_state(taught.taught_model(contracting(v), v[5:11]), v[11:], v[5:11]).c,
         {
-            "ordinary": ([1.0, 0.3, 0.4, 2.0, 1.1, 1.0, -0.5, 0.4, 3.0, 0.3, *LOADED], True),
-            "far ground": ([30.0, 0.0, 0.4, 2.0, 1.1, 1.0, -0.5, 0.4, 3.0, 0.3, *LOADED], True),
+            "ordinary": ([1.0, 0.3, 0.7, 0.2, 0.9, 0.8, 0.3, 0.5, 1.1, 0.9, 0.4, *LOADED], True),
+            "far ground": ([30.0, 0.0, 0.7, 0.2, 0.9, 0.8, 0.3, 0.5, 1.1, 0.9, 0.4, *LOADED], True),
         },
     ),
     Rung(
@@ -323,13 +410,14 @@ RUNGS = [
 MODULES = {
     "ellipsoidal": ellipsoidal, "legendre": legendre, "field": flow, "loading": loading,
     "ground_source": ground_source, "matrices": matrices, "model": model, "rigid_cylinder": rigid_cylinder,
-    "dynamics": dynamics, "taught": taught,
+    "dynamics": dynamics, "taught": taught, "contraction": contraction,
 }  # fmt: skip
 STATIC = {  # numbers and tables that no one differentiates
     "legendre.double_factorial", "legendre.h_constant", "legendre.k_constant", "legendre.rho", "field.sigma",
     "field.zeta", "ground_source.correction", "ground_source.source_solver", "matrices.gamma", "matrices.damping",
     "matrices.apparent_mass", "model.finite_state_model", "model.footprint", "dynamics.hover_inputs",
-    "dynamics.rate_table",
+    "dynamics.rate_table", "ground_source.printed_strengths", "model.choices", "model.strength_factors",
+    "contraction.contraction",
 }  # fmt: skip
 
 

@@ -42,9 +42,9 @@ def test_the_difference_is_the_studys(taught, study):
 
 
 def test_out_of_ground_effect_ignores_the_ground(taught):
-    strong = PARAMETERS.vector({"source_gain": 9.0, "reach": 3.0, "slope_share": 0.0})
+    strong = PARAMETERS.vector({"clearance": 3.5, "slope_share": 0.0})
     fields = teacher.inflow(strong, taught.data)
-    np.testing.assert_array_equal(fields[0], taught.inflow_printed[0])
+    np.testing.assert_allclose(fields[0], taught.inflow_printed[0], rtol=1e-7)
     assert np.max(np.abs(fields[1] - taught.inflow_printed[1])) > 0.1
 
 
@@ -101,7 +101,7 @@ def test_a_file_that_is_no_study_is_refused(study, tmp_path):
     netcdf.write(tmp_path / "other.nc", study.drop_vars("vpbfsm_tau"))
     with pytest.raises(InputError, match=r"must be the cases\.nc of a study, but lacks vpbfsm_tau"):
         teacher.find_cases(tmp_path / "other.nc")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="must be readable"):
         teacher.find_cases(tmp_path / "missing.nc")
 
 
@@ -112,4 +112,5 @@ def test_level_cases_cannot_teach_the_slope(study):
     result = freewake_run.run(study, ("mean_gain", "slope_share"), held=slopes)
     assert not result.fit.converged
     assert "do not determine" in result.fit.why
-    np.testing.assert_array_equal(result.values[1:5], PARAMETERS.printed[1:5])
+    kept = [PARAMETERS.names.index(n) for n in ("radius", "length", "clearance", "third_gain")]
+    np.testing.assert_array_equal(result.values[kept], PARAMETERS.printed[kept])

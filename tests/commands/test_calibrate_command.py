@@ -22,10 +22,10 @@ def test_hayden_writes_everything(tmp_path, capsys):
     assert found["wall_time_s"] < 10
     assert len(found["covariance"]) == 2
     saved = load(out / "calibration.toml")
-    assert saved.parameters == pytest.approx({"b": found["b"], "p": found["p"]})
+    assert saved.parameters == pytest.approx({n: found[n] for n in ("radius", "clearance")})
     assert (out / "hayden.png").stat().st_size > 10000
     printed = capsys.readouterr().out
-    assert "printed factor" in printed
+    assert "default" in printed
     assert "converged: " in printed
 
 
@@ -35,7 +35,7 @@ def test_freewake_writes_a_picture_of_every_held_out_case(tmp_path, capsys, know
     assert main(["calibrate", "freewake", "--cases", str(known), "--out", str(out)]) == 0
     found = json.loads((out / "calibration.json").read_text())
     assert found["held_out"]["halved"]
-    assert found["parameters"]["reach"] == pytest.approx(0.5, rel=1e-4)
+    assert found["parameters"]["radius"] == pytest.approx(0.82, rel=1e-4)
     assert len(found["parameters"]) <= 8
     assert found["gradient_cost"]["gradient_s"] > 0
     pictures = {p.name for p in out.glob("*.png")}
@@ -59,12 +59,12 @@ BAD = {
     "calibrate hayden": "--out",
     "calibrate hayden --out {tmp}/a --heights 0.1": "but holds 0.1",
     "calibrate hayden --out {tmp}/a --heights 9": "but holds 9",
-    "calibrate hayden --out {tmp}/a --parameters b,q": "but holds 'q'",
-    "calibrate hayden --out {tmp}/a --heights 1": "there are 2 (b, p) and 1 data",
+    "calibrate hayden --out {tmp}/a --parameters radius,q": "but holds 'q'",
+    "calibrate hayden --out {tmp}/a --heights 1": "there are 2 (radius, clearance) and 1 data",
     "calibrate hayden --out {tmp}/a --loading square": "invalid choice: 'square'",
     "calibrate hayden --out {tmp}/file/a": "must be writable",
     "calibrate freewake --out {tmp}/a": "--cases",
-    "calibrate freewake --out {tmp}/a --cases {tmp}/none.nc": "cannot be read",
+    "calibrate freewake --out {tmp}/a --cases {tmp}/none.nc": "must be readable",
     "calibrate freewake --out {tmp}/a --cases {tmp} --held h9": "but holds 'h9'",
     "calibrate freewake --out {tmp}/a --cases {tmp} --parameters core": "but holds 'core'",
     "calibrate hayden --out {tmp}/a --cases {tmp} --heights 1.2": "h1.2 is not",

@@ -23,6 +23,8 @@ from rotorjax.potential.model import finite_state_model, mean_inflow, steady_sta
 from rotorjax.potential.modes import rotor_modes
 from rotorjax.potential.skewed import skewed_functions
 
+cylinder_model = partial(finite_state_model, printed=True, strengths="closed")  # the linear flow of a cylinder
+
 CT = 0.006
 V0 = np.sqrt(CT / 2)
 
@@ -57,7 +59,7 @@ def march(model, inputs, psi, skewed=False):
 @pytest.mark.parametrize("skewed", [False, True])
 @pytest.mark.parametrize("even_terms", [0, 2])
 def test_equilibrium_in_hover_is_the_steady_model(mass_flow, skewed, even_terms):
-    model = finite_state_model(
+    model = cylinder_model(
         plane(1.0, 15.0), harmonics=1, ground_harmonics=1, mass_flow=mass_flow, even_terms=even_terms
     )
     tau = jnp.where(model.modes.odd, 1e-4, 0.0).at[0].set(2.6e-3)
@@ -69,7 +71,7 @@ def test_equilibrium_in_hover_is_the_steady_model(mass_flow, skewed, even_terms)
 
 
 def test_mass_flow_in_forward_flight():
-    model = finite_state_model(harmonics=1, radial_terms=2)
+    model = cylinder_model(harmonics=1, radial_terms=2)
     a = jnp.zeros(6).at[0].set(0.03)
     inputs = RotorInputs(jnp.zeros(6), jnp.array(0.15), jnp.array(0.01))
     v, inverse = flow_matrices(a, inputs, model)
@@ -85,7 +87,7 @@ def test_mass_flow_in_forward_flight():
 
 def test_frequency_response_of_one_state_is_first_order():
     """dλ₀/dτ₁ = (2/√3)/(2V₀ + iω M/D) with V = V₀ + δλ: the linearised scalar equation."""
-    model = finite_state_model(radial_terms=1)
+    model = cylinder_model(radial_terms=1)
     tau = tau_of(model)
     state = steady_state(model, tau)
 
@@ -101,7 +103,7 @@ def test_frequency_response_of_one_state_is_first_order():
 @pytest.mark.parametrize("mass_flow", ["paper", "linear"])
 def test_step_response_against_carpenter_and_fridovich(mass_flow):
     """0.849 λ' + 2λ² = C_T from rest: λ = v₀ tanh(2v₀ψ/0.849); within 5 % of v₀ at all times (NACA TN 3044)."""
-    model = finite_state_model(radial_terms=4, mass_flow=mass_flow)
+    model = cylinder_model(radial_terms=4, mass_flow=mass_flow)
     psi = jnp.linspace(0, 60, 1201)
     a = march(model, hover_inputs(jnp.broadcast_to(tau_of(model), (1201, 4))), psi)
     lam = jax.vmap(lambda a: mean_inflow(with_ground(a, model), model))(a)
@@ -114,7 +116,7 @@ def test_first_acceleration_is_that_of_an_impermeable_disk():
     """The apparent mass 8/3π, approached from below as radial terms are added."""
     errors = []
     for terms in (1, 3, 7):
-        model = finite_state_model(radial_terms=terms)
+        model = cylinder_model(radial_terms=terms)
         rate = rhs(jnp.array(0.0), with_ground(jnp.zeros(terms), model), hover_inputs(tau_of(model)), model)
         errors.append(1 - float(mean_inflow(rate, model)) / (3 * np.pi / 8 * CT))
     assert errors[0] > 4 * errors[1] > 8 * errors[2] > 0
@@ -151,10 +153,10 @@ def along_streamline(model, x, z, omega, time):
 @pytest.mark.parametrize("omega", [0.3, 1.0])
 def test_unsteady_flow_everywhere_against_integration_along_streamlines(omega):
     time, places = 120.0, [(0.4, 0.5), (0.4, -0.5), (0.4, -2.0), (1.5, -1.0)]
-    exact = [along_streamline(finite_state_model(radial_terms=1), x, z, omega, time) for x, z in places]
+    exact = [along_streamline(cylinder_model(radial_terms=1), x, z, omega, time) for x, z in places]
     points, errors = jnp.array([[x, 0.0, z] for x, z in places]), []
     for odd, even in ((4, 0), (4, 3), (7, 7)):
-        model = finite_state_model(radial_terms=odd, even_terms=even)
+        model = cylinder_model(radial_terms=odd, even_terms=even)
         a, delta = oscillation(model, omega)
         mine = axial_velocity(jnp.array(time), points, WINDOW, a, delta, jnp.array(1.0), model) * 1e7
         errors.append(np.abs(mine - np.array(exact)).max())
@@ -163,7 +165,7 @@ def test_unsteady_flow_everywhere_against_integration_along_streamlines(omega):
 
 
 def test_steady_unsteady_flow_is_the_steady_field():
-    model = finite_state_model(harmonics=1)
+    model = cylinder_model(harmonics=1)
     tau = jnp.full(9, 1e-4).at[0].set(2.6e-3)
     a = jnp.broadcast_to(steady_state(model, tau).a, (50, 9))
     psi = jnp.linspace(0, 30, 50)
@@ -181,7 +183,7 @@ def test_skewed_steady_flow_below_the_disk_against_the_exact_one():
     points = jnp.array([[0.3, 0.2, -0.4], [0.6, -0.3, -1.0], [0.2, 0.4, -0.7], [-1.4, 0.0, -0.3]])
     exact = -skewed_functions(rotor_modes(0, 1), points, jnp.array(chi))[2, 0]
     for harmonics, terms in ((1, 1), (3, 2), (5, 3)):
-        model = finite_state_model(harmonics=harmonics, radial_terms=terms, mass_flow="linear")
+        model = cylinder_model(harmonics=harmonics, radial_terms=terms, mass_flow="linear")
         count = len(model.modes)
         tau = jnp.zeros(count).at[0].set(1e-7)
         inputs = RotorInputs(jnp.zeros((2, count)) + tau, jnp.full(2, np.sin(chi)), jnp.full(2, np.cos(chi)))
@@ -198,7 +200,7 @@ def test_skewed_steady_flow_below_the_disk_against_the_exact_one():
 
 
 def test_costates_forget_the_end_of_the_window_and_stay_bounded_for_fifty_revolutions():
-    model = finite_state_model()
+    model = cylinder_model()
     psi = jnp.linspace(0, 100 * np.pi, 2001)
     tau = tau_of(model) * (1 + 0.3 * jnp.sin(0.1 * psi))[:, None]
     inputs = hover_inputs(tau)
@@ -213,7 +215,7 @@ def test_costates_forget_the_end_of_the_window_and_stay_bounded_for_fifty_revolu
 
 
 def test_costates_are_second_order():
-    model, errors = finite_state_model(), []
+    model, errors = cylinder_model(), []
 
     def run(steps):
         psi = jnp.linspace(0, 40, steps + 1)
@@ -228,7 +230,7 @@ def test_costates_are_second_order():
 
 @pytest.mark.parametrize("mu", [0.0, 0.1])
 def test_derivative_ladder(mu):
-    model = finite_state_model(plane(1.0, 10.0), harmonics=1, radial_terms=2, ground_harmonics=1)
+    model = cylinder_model(plane(1.0, 10.0), harmonics=1, radial_terms=2, ground_harmonics=1)
     tau = jnp.full(6, 2e-4).at[0].set(2.6e-3)
 
     @jax.jit
@@ -245,7 +247,7 @@ def test_derivative_ladder(mu):
 
 
 def test_rest_has_finite_derivatives():
-    model = finite_state_model()
+    model = cylinder_model()
     tau = tau_of(model)
     slope = jax.jacrev(lambda a: rhs(jnp.array(0.0), with_ground(a, model), hover_inputs(tau), model).a)(jnp.zeros(3))
     assert np.all(np.isfinite(slope))
@@ -253,6 +255,6 @@ def test_rest_has_finite_derivatives():
 
 
 def test_bad_shapes_are_refused():
-    model = finite_state_model()
+    model = cylinder_model()
     with pytest.raises(InputError, match="share T and M"):
         costates(jnp.arange(4.0), jnp.zeros((5, 3)), hover_inputs(jnp.zeros((5, 3))), model)

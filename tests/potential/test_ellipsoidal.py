@@ -67,3 +67,9 @@ def test_derivatives_on_the_upper_face_are_one_sided():
 @pytest.mark.parametrize("jacobian", [jax.jacfwd, jax.jacrev])
 def test_finite_at_the_edge(jacobian):
     assert np.all(np.isfinite(jacobian(lambda p: jnp.stack(ellipsoidal(p)))(jnp.array([1.0, 0.0, 0.0]))))
+
+
+@pytest.mark.parametrize("z", [1e-300, 1e-170, 0.0])
+def test_finite_where_the_square_of_the_height_is_zero(z):
+    for jacobian in (jax.jacfwd, jax.jacrev):
+        assert np.all(np.isfinite(jacobian(lambda v: jnp.stack(nu_eta(v[0], v[1])))(jnp.array([1.0, z]))))

@@ -140,3 +140,11 @@ def test_edge_and_far_points_are_finite():
         slopes = jax.jit(jax.grad(lambda p, m=modes: pressure_functions(m, p).sum()))(points)
         assert np.all(np.isfinite(slopes))
         assert np.all(np.isfinite(FIELD(modes, points)))
+
+
+@pytest.mark.parametrize("x", [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+def test_in_plane_velocity_on_the_rim_is_that_beside_it(x):
+    points = jnp.array(x) * jnp.array([1.0, 1 + 1e-9])[:, None]
+    on, beside = np.moveaxis(np.array(velocity_functions(ROTOR, points))[:2], 2, 0)
+    np.testing.assert_allclose(on, beside, atol=1e-2 * np.abs(beside).max())
+    assert np.abs(on).max() > 0.01

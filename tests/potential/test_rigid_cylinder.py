@@ -25,11 +25,20 @@ def test_level_ground_is_the_closed_form():
     np.testing.assert_allclose(mine, phi(0.0) - 2 * phi(0.5) + phi(1.0), atol=1e-9)
 
 
+@pytest.mark.parametrize("height", [0.05, 0.1])
+def test_low_over_level_ground_it_is_the_closed_form_too(height):
+    model = finite_state_model(plane(height), radial_terms=1)
+    points = jnp.stack([R, 0 * R, 0 * R], axis=-1)
+    phi = [pressure_functions(model.modes, points.at[:, 2].set(z))[0] for z in (0.0, height, 2 * height)]
+    mine = rigid_cylinder.inflow(FiniteState(jnp.ones(1), jnp.zeros(7)), R, PSI[:1], model)[0]
+    np.testing.assert_allclose(mine, phi[0] - 2 * phi[1] + phi[2], atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("height", "ratio"), [(0.5, 0.344), (0.75, 0.495), (1, 0.609), (1.5, 0.755), (2, 0.837), (3, 0.916)]
 )
 def test_mean_inflow_ratio(height, ratio):
-    model = finite_state_model(plane(height), radial_terms=1)
+    model = finite_state_model(plane(height), radial_terms=1, printed=True)
     state = steady_state(model, jnp.array([np.sqrt(3) / 4 * CT]))
     assert abs(float(rigid_cylinder.mean_inflow(state, model) / np.sqrt(CT / 2)) - ratio) < 6e-4
 

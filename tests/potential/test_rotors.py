@@ -11,7 +11,9 @@ from rotorjax.potential.rotors import inflows, mean_inflows, rates, rotors, stea
 
 CT = 0.006
 V0 = np.sqrt(CT / 2)
-MODEL = finite_state_model(harmonics=1, radial_terms=1, quadrature=DiskQuadrature(12, 16))
+SIZE = {"harmonics": 1, "radial_terms": 1, "quadrature": DiskQuadrature(12, 16)}
+CYLINDER = {"printed": True, "strengths": "closed"}  # wakes that do not contract
+MODEL = finite_state_model(**SIZE, **CYLINDER)
 TAU = jnp.zeros(3).at[0].set(np.sqrt(3) / 4 * CT)
 
 
@@ -36,6 +38,14 @@ def test_coaxial_pair_far_apart():
     upper, lower = mean_inflows(a, system)
     np.testing.assert_allclose(upper, V0, rtol=1e-3)
     np.testing.assert_allclose(lower, (1 + np.sqrt(2)) * V0, rtol=1e-3)
+
+
+def test_a_contracted_wake_brings_half_of_the_flow():
+    """Momentum theory's slipstream: 2 v₀ over half of the lower disk, λ (λ − v₀) = v₀²."""
+    system, a = solve([(0, 0, 0), (0, 0, -40.0)], finite_state_model(**SIZE))
+    upper, lower = mean_inflows(a, system)
+    np.testing.assert_allclose(upper, V0, rtol=2e-3)
+    np.testing.assert_allclose(lower, (1 + np.sqrt(5)) / 2 * V0, rtol=1e-2)
 
 
 def test_coaxial_pair_between():
@@ -87,11 +97,12 @@ def test_whole_system_tilted_is_the_same_system():
     np.testing.assert_allclose(mean_inflows(b, system), mean_inflows(a, level), rtol=1e-10)
 
 
-def test_one_rotor_over_ground_is_the_steady_model():
+@pytest.mark.parametrize(("choices", "tolerance"), [({}, 1e-6), (CYLINDER, 1e-12)], ids=["default", "cylinder"])
+def test_one_rotor_over_ground_is_the_steady_model(choices, tolerance):
     ground = plane(1.2)
-    model = finite_state_model(ground, harmonics=1, radial_terms=1, ground_harmonics=1, quadrature=MODEL.quadrature)
+    model = finite_state_model(ground, ground_harmonics=1, **SIZE, **choices)
     system, a = solve([(0, 0, 0.2)], model, ground=plane(1.0))
-    np.testing.assert_allclose(mean_inflows(a, system)[0], mean_inflow(steady_state(model, TAU), model), rtol=1e-12)
+    np.testing.assert_allclose(mean_inflows(a, system)[0], mean_inflow(steady_state(model, TAU), model), rtol=tolerance)
 
 
 def test_rates_vanish_in_steady_state_and_differentiate():

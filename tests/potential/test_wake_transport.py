@@ -1,3 +1,5 @@
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,23 +10,26 @@ from rotorjax.ground import Plane
 from rotorjax.potential.field import pressure_functions
 from rotorjax.potential.ground_source import rotor_on_ground
 from rotorjax.potential.matrices import apparent_mass, damping
-from rotorjax.potential.model import finite_state_model
+from rotorjax.potential.model import finite_state_model, wake_over
 from rotorjax.potential.wake_transport import transported_flow, wake_transport
+
+cylinder_model = partial(finite_state_model, printed=True, strengths="closed")  # the linear flow of a cylinder
 
 GROUND = Plane(jnp.array(1.0), jnp.array(0.2))
 X, Y = jnp.array([0.4, -0.2, 0.9]), jnp.array([0.0, 0.3, 0.1])
 
 
-@pytest.mark.parametrize("mass_flow", ["linear", "paper"])
-def test_settled_wake_is_the_steady_flow(mass_flow):
-    model = finite_state_model(harmonics=1, mass_flow=mass_flow)
+@pytest.mark.parametrize("choices", [{"wake": None, "mass_flow": "linear"}, {"wake": None, "mass_flow": "paper"}, {}])
+def test_settled_wake_is_the_steady_flow(choices):
+    model = finite_state_model(harmonics=1, **choices)
     flow = transported_flow(model, wake_transport(2.0), GROUND, X, Y).sum(axis=-1)
-    np.testing.assert_allclose(flow, rotor_on_ground(model.modes, GROUND, X, Y).T, atol=1e-13)
+    steady = rotor_on_ground(model.modes, GROUND, X, Y, wake_over(model, GROUND))
+    np.testing.assert_allclose(flow, steady.T, atol=1e-13)
 
 
 def along_streamline(x, depth, omega):
     """Complex amplitude of ∫ (−∂Φ₁/∂z) e^{−iωs} ds down to a depth, for τ₁ = e^{iωψ} at unit speed: the exact flow."""
-    modes = finite_state_model(radial_terms=1).modes
+    modes = cylinder_model(radial_terms=1).modes
     node, weight = np.polynomial.legendre.leggauss(40)
     edges = np.sort(np.append(np.concatenate([np.linspace(0, 5 + depth, 11), np.linspace(10, 180, 60)]), depth))
     widths = np.diff(edges)
@@ -38,7 +43,7 @@ def along_streamline(x, depth, omega):
 @pytest.mark.parametrize(("omega", "worst"), [(0.3, 0.015), (1.0, 0.015)])
 def test_unsteady_flow_against_integration_along_streamlines(omega, worst):
     """Causal, from rotor states alone: odd and even ones, whose truncation is what is left (of 2.5)."""
-    model = finite_state_model(radial_terms=4, even_terms=3, mass_flow="linear")
+    model = cylinder_model(radial_terms=4, even_terms=3, mass_flow="linear")
     d, mass = damping(model.modes, model.modes), apparent_mass(model.modes, model.modes)
     a = np.linalg.solve(1j * omega * mass + d, d[:, 0])
     transport = wake_transport(2.5, 10)

@@ -1,3 +1,5 @@
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,7 +13,9 @@ from rotorjax.potential.model import finite_state_model, steady_state
 from rotorjax.potential.modes import rotor_modes
 from rotorjax.potential.window import delayed_costates, flow_over_window, forgetting_rate, require_window, velocity_at
 
-MODEL = finite_state_model()
+cylinder_model = partial(finite_state_model, printed=True, strengths="closed")  # the linear flow of a cylinder
+
+MODEL = cylinder_model()
 TAU = jnp.array([np.sqrt(3) / 4 * 0.006, 3e-4, 1e-4])
 SPEED = np.sqrt(0.003)
 PSI = jnp.linspace(0, 120, 601)
@@ -69,7 +73,7 @@ def test_both_components_against_integration_along_streamlines(omega):
     points, errors = jnp.array([[x, 0.0, z] for x, z in places]), []
     psi = jnp.linspace(0, 200, 4001)
     for odd, even in ((2, 0), (4, 3), (7, 7)):
-        model = finite_state_model(radial_terms=odd, even_terms=even)
+        model = cylinder_model(radial_terms=odd, even_terms=even)
         d, mass = damping(model.modes, model.modes), apparent_mass(model.modes, model.modes)
         response = np.linalg.solve(1j * omega * mass + d, d[:, 0]) * 1e-7
         a = jnp.array((np.exp(1j * omega * np.array(psi))[:, None] * response).imag)

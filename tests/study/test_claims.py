@@ -5,6 +5,7 @@ import pytest
 
 from rotorjax.bench.cases import Case
 from rotorjax.study import claims, level_claims, slope_claims
+from rotorjax.study.claim import GOOD_AGREEMENT
 from rotorjax.study.reading import Reading, falls
 
 
@@ -48,10 +49,10 @@ def test_verdicts_turn(merged):
     )
 
 
-def test_agreement_is_ten_per_cent(merged):
+def test_agreement_is_a_tenth_of_what_the_figures_span(merged):
     judge = level_claims.close_at(Case(1.0))
-    assert judge(changed(merged, vpbfsm_inflow_rms_difference=lambda v, n: 0 * v + 0.09))[0] is True
-    assert judge(changed(merged, vpbfsm_inflow_rms_difference=lambda v, n: 0 * v + 0.11))[0] is False
+    assert judge(changed(merged, vpbfsm_inflow_rms_difference=lambda v, n: 0 * v + GOOD_AGREEMENT - 0.01))[0] is True
+    assert judge(changed(merged, vpbfsm_inflow_rms_difference=lambda v, n: 0 * v + GOOD_AGREEMENT + 0.01))[0] is False
 
 
 def test_closer_on_the_valley_side(merged):

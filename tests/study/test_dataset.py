@@ -71,8 +71,19 @@ def test_summary_entries_have_the_agreed_keys(studied):
             "compile_time_s",
         ]
         wake = ["CT", "CP_induced", "mean_inflow", "residual", "converged", "ground_normal_velocity_rms"]
-        assert list(entry["free_wake"]) == wake
+        assert list(entry["free_wake"]) == [*wake, "CP", "CP_profile", "lost_at"]
+        assert entry["free_wake"]["CP"] == pytest.approx(
+            entry["free_wake"]["CP_induced"] + entry["free_wake"]["CP_profile"]
+        )
         assert list(entry["vpbfsm"]) == ["mean_inflow", "ground_normal_velocity_rms"]
+
+
+def test_cases_have_height_and_slope_along_them(merged):
+    grounded = merged.where(merged["height"] == 1.0, drop=True)
+    assert set(grounded["slope_deg"].to_numpy()) == {0.0, 5.0, 8.0, 10.0, 15.0, 30.0, 40.0}
+    assert {"height", "slope_deg"} <= set(merged.coords)
+    assert str(merged["mode"].to_numpy()[0]) == "m = 0, n = 1, cos"
+    assert merged.attrs["rotor"] == "UH-60A"
 
 
 def test_without_the_case_out_of_ground_effect_there_is_no_difference(studied, settings):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from rotorjax.bench.azimuth import refine_azimuth
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import select
-from rotorjax.bench.plotting import across, refine_azimuth, shared_levels
+from rotorjax.bench.plotting import across, shared_levels
 from rotorjax.study.figures import FIGURES, across_disk
 
 PAPER = ["06", "07", "08a", "08b", "09", "10a", "10b", "11", "12", "13", "14a", "14b", "15", "16a", "16b"]
@@ -32,12 +33,13 @@ def test_axes_are_labelled(merged, name):
     assert labels
 
 
-def test_contours_have_the_mountain_at_the_right_and_270_degrees_at_the_top(merged):
+def test_contours_are_seen_from_above_with_the_mountain_at_the_right(merged):
     figure = FIGURES["fig11"](merged)
     assert figure is not None
     polar = next(axes for axes in figure.axes if axes.name == "polar")
     assert polar.get_theta_offset() == 0.0
-    assert polar.get_theta_direction() == -1
+    assert polar.get_theta_direction() == 1  # counter-clockwise, as the rotor turns
+    assert polar.get_xlabel() == "seen from above"
 
 
 def test_curves_run_from_valley_to_mountain(merged):

@@ -62,11 +62,11 @@ def test_hover_needs_no_cyclic_and_momentum_theorys_power(hover):
 
 def test_a_revolution_marched_from_the_trim_ends_where_it_began(cruise):
     """The trim is an orbit of the equations of motion themselves, found without marching them."""
-    z, u = cruise.z, inputs_at(cruise.z.controls, cruise.flight)
+    z, u = cruise.trimmed.z, inputs_at(cruise.trimmed.z.controls, cruise.trimmed.flight)
     start = CoupledState(jnp.zeros(()), *jax.tree.map(lambda v: v[0], (z.rotor, z.inflow)))
     steps = 240
     march = eqx.filter_jit(lambda x, u, p: integrate(rhs, x, 0.0, 2 * np.pi / steps, steps, u, p, save_every=10))
-    found = march(start, u, cruise.p)
+    found = march(start, u, cruise.trimmed.p)
     assert found.x.psi[-1] == pytest.approx(2 * np.pi)
     whole, _ = revolution(z, 4)
     np.testing.assert_allclose(found.x.rotor.flap[:-1], whole.flap, atol=2e-5)
@@ -84,8 +84,8 @@ def test_a_thrust_beyond_stall_names_the_limit():
 
 def test_outputs_are_those_of_equal_blades(cruise):
     """Every node sees all blades; blade b at node k stands at ψ_k + 2πb/B: one curve over the azimuth."""
-    out = outputs_at(cruise.z, cruise.flight, cruise.p)
-    psi = node_azimuths(cruise.z, 4)[:, None] + np.pi / 2 * np.arange(4)
+    out = outputs_at(cruise.trimmed.z, cruise.trimmed.flight, cruise.trimmed.p)
+    psi = node_azimuths(cruise.trimmed.z, 4)[:, None] + np.pi / 2 * np.arange(4)
     order = np.argsort(np.ravel(psi))
     flap = np.ravel(out.flap)[order]
     assert np.max(np.abs(np.fft.rfft(flap)[6:])) / flap.size < 1e-4  # smooth: no blade is out of track
@@ -98,19 +98,19 @@ def test_derivative_of_power_at_trim(cruise):
 
     def of(step):
         v = 1 + step * way
-        rotor = cruise.p.rotor
+        rotor = cruise.trimmed.p.rotor
         changed = eqx.tree_at(
             lambda p: (p.rotor.chord.values, p.rotor.twist.values),
-            cruise.p,
+            cruise.trimmed.p,
             (rotor.chord.values * v[1], rotor.twist.values * v[2]),
         )
-        return eqx.tree_at(lambda f: f.thrust, cruise.flight, THRUST * v[0]), changed
+        return eqx.tree_at(lambda f: f.thrust, cruise.trimmed.flight, THRUST * v[0]), changed
 
     _, slope = jax.jvp(lambda s: trimmed_power(cruise.trimmed, *of(s)), (0.0,), (1.0,))
     ends = []
     for step in (1e-4, -1e-4):
         flight, p = of(step)
-        ends.append(float(power(trim(p, flight, start=cruise.z).z, flight, p)))
+        ends.append(float(power(trim(p, flight, start=cruise.trimmed.z).z, flight, p)))
     assert float(slope) == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-6)
 
 

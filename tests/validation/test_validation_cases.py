@@ -10,7 +10,7 @@ from rotorjax.errors import InputError
 from rotorjax.reference.published import Hover, Path, induced_power_factor, knight_hefner
 from rotorjax.reference.published import caradonna_tung as caradonna_tung_data
 from rotorjax.rotor.catalogue import load
-from rotorjax.validation import caradonna_tung, ground, momentum, polars, step
+from rotorjax.validation import caradonna_tung, grid, ground, momentum, polars, step
 from rotorjax.validation.case import Subject
 from rotorjax.validation.cases import CASES, chosen_cases
 from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
@@ -77,6 +77,27 @@ def test_the_first_harmonic_is_the_area_mean_of_the_fields_own(coarse_hover):
     assert first_harmonic(there, np.cos(psi)[:, None] * r) == pytest.approx(mean)
 
 
+def test_the_grids_wakes_differ_in_one_number_and_each_near_the_ground_has_one_to_start_from():
+    pairs, tasks = grid.pairs(Subject()), grid.points(Subject())
+    assert {finer.changes[0][0] for _, finer in pairs} == {"panels", "age_step_deg", "free_turns"}
+    for base, finer in pairs:
+        assert not base.changes
+        assert replace(finer, changes=()) == base
+    assert {base.slope_deg for base, _ in pairs} == {0.0, 10.0, 20.0, 30.0}
+    for task in tasks:
+        assert (needed(task, tasks) is None) == (task.height is None)
+
+
+def test_a_harmonics_change_counts_phase_and_size(coarse_hover):
+    psi = np.linspace(0, 2 * np.pi, 8, endpoint=False)
+    there = [
+        replace(coarse_hover, psi=psi, inflow=np.outer(f(psi), np.ones_like(coarse_hover.r))) for f in (np.cos, np.sin)
+    ]
+    larger = replace(there[0], inflow=1.1 * there[0].inflow)
+    assert grid.harmonic_change(there[0], larger, grid.FIRST["inflow"]) == pytest.approx(0.1)
+    assert grid.harmonic_change(*there, grid.FIRST["inflow"]) == pytest.approx(np.sqrt(2))
+
+
 def test_the_isolated_rotors_curve_judges_a_model_rotor_and_hayden_joins_in_for_a_helicopters():
     model, flown = point("knight_hefner_2", 8.0, 0.5), point("uh60", 18.0, 0.5)
     for at, low, high in ((model, 0.68, 0.76), (flown, 0.5853, 0.76)):
@@ -111,6 +132,13 @@ def test_a_straight_path_has_its_pitch():
 def test_no_ground_is_infinitely_far(coarse_hover):
     assert clearance(coarse_hover) == np.inf
     assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
+    assert ground.power_ratio(coarse_hover, coarse_hover) == 1
+
+
+def test_the_power_ratio_is_that_at_constant_thrust(coarse_hover):
+    """Twice the thrust with 2^1.5 times 0.8 of the induced power is a rotor that needs 0.8 of it at the same thrust."""
+    near = replace(coarse_hover, CT=2 * coarse_hover.CT, CP_induced=0.8 * 2**1.5 * coarse_hover.CP_induced)
+    assert ground.power_ratio(near, coarse_hover) == pytest.approx(0.8)
 
 
 def test_inflow_over_the_disk_is_less_than_at_the_blades_and_has_converged_in_azimuth(coarse_hover):

@@ -1,0 +1,144 @@
+"""A wake that narrows: the rigid cylinder's flow, laid along a tube of radius ρ(s) = κ + (1 − κ) e^{−s/L}.
+
+The paper's wake is a cylinder of the rotor's radius. A rotor's slipstream narrows, to κ = 1/√2 in momentum theory, and
+within a fraction of the radius: that is what the cylinder lacks out of ground effect.
+
+Near the disk the tube keeps its volume flux, so its strength per area grows as ρ⁻². Split where it narrows, it is the
+cylinder, less the rest of the cylinder below each depth s, plus a narrower one from there on. With the velocity C(p) of
+a unit state of the semi-infinite cylinder that begins at the disk,
+
+    near(p) = A {C(p) + Σ_k [ρ_{k+1}⁻² C((p + s_k ẑ)/ρ_{k+1}) − ρ_k⁻² C((p + s_k ẑ)/ρ_k)]},
+
+and A keeps the mean inflow of the first state, by which momentum theory holds: thrust fixes it, whatever the wake's
+shape. Far below, the flow is momentum theory's slipstream, twice the first state's over κ²: far(p) = C(p/κ), of which a
+contracted wake brings κ² of the cylinder's flux to the ground. Between them it passes with e^{−s/L}. That is a
+description and no solution: between the two the flow loses flux.
+
+Over ground the wake can contract less, since it has to run out along the plane: κ and L shrink together (the wake
+leaves the disk at the same angle) by 1/(1 + (clearance/h)³). The cube is how an image's flow at the disk falls with
+distance.
+"""
+
+from collections.abc import Callable
+from math import sqrt
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.potential.field import pressure_functions
+from rotorjax.potential.modes import ModeTable, rotor_modes
+
+NODES = 96  # along the radius, for means: the steps of the tube leave kinks
+STEPS = 6  # in which the tube narrows: the inflow to 1e-3 of its mean
+FIRST = rotor_modes(0, 1)
+MOMENTUM, LENGTH, CLEARANCE = 1 / sqrt(2), 0.2, 0.9  # the defaults, see `contraction`
+Functions = Callable[[ModeTable, Float[Array, "*N 3"]], Float[Array, "..."]]
+
+
+class Contraction(eqx.Module):
+    """radius (): κ, of the wake far below, over R. length (): L, the depth in which 1 − 1/e of the way there is done,
+    over R. clearance (): height of the rotor over ground, over R, at which the wake contracts half as much.
+    """
+
+    radius: Float[Array, ""]
+    length: Float[Array, ""]
+    clearance: Float[Array, ""]
+
+    def shared(self, share: Float[Array, ""]) -> "Contraction":
+        """A wake that contracts by this share, in as much of the way."""
+        return Contraction(1 - share * (1 - self.radius), share * self.length, self.clearance)
+
+    def over(self, height: Float[Array, ""]) -> "Contraction":
+        """The wake of a rotor that hovers at a height over ground, over R."""
+        return self.shared(1 / (1 + (self.clearance / height) ** 3))
+
+    def in_stream(self, ratio: Float[Array, ""]) -> "Contraction":
+        """The wake in a stream. ratio: V_T of the disk over that of the slipstream, ½ in hover, 1 where the wind
+        outruns the inflow: momentum theory's κ².
+        """
+        return self.shared((1 - jnp.sqrt(ratio)) / (1 - MOMENTUM))
+
+
+def contraction(radius: float = MOMENTUM, length: float = LENGTH, clearance: float = CLEARANCE) -> Contraction:
+    """Make a contraction; see `Contraction`.
+
+    The far radius is momentum theory's (Landgrebe's tip vortex: 0.78), the length and the clearance are rounded from
+    the free wake's inflow out of ground effect and at h = 1. Raises InputError where the radius is not in (0, 1] or
+    another number is not positive.
+    """
+    if not 0 < radius <= 1:
+        raise InputError(f"Argument `radius` must lie in (0, 1] (of the wake far below, over R), but is {radius}")
+    for name, value in {"length": length, "clearance": clearance}.items():
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"Argument `{name}` must be positive and finite (over R), but is {value}")
+    return Contraction(*(jnp.asarray(v, float) for v in (radius, length, clearance)))
+
+
+def _tube(
+    functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
+) -> Float[Array, "..."]:
+    """The near flow without A, for odd modes; even ones, which bear no load, as in the cylinder."""
+    done = np.arange(STEPS + 1) / STEPS  # share of the contraction
+    rho, middle = 1 - (1 - wake.radius) * done, (done[1:] + done[:-1]) / 2
+    depth = -wake.length * np.log1p(-middle)
+    scale = jnp.concatenate([jnp.ones(1), rho[1:], rho[:-1]])
+    below = jnp.concatenate([jnp.zeros(1), depth, depth])
+    weight = jnp.concatenate([jnp.ones(1), rho[1:] ** -2, -(rho[:-1] ** -2)])
+    shape = (-1,) + (1,) * points.ndim
+    moved = (points + below.reshape(shape) * np.array([0.0, 0.0, 1.0])) / scale.reshape(shape)
+    parts = jnp.moveaxis(functions(modes, moved), -points.ndim, -1)  # the parts last, behind the points
+    odd = jnp.asarray(modes.odd).reshape((-1,) + (1,) * (points.ndim - 1))
+    return jnp.where(odd, parts @ weight, parts[..., 0])
+
+
+def _means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
+    """Area-weighted mean over the disk of the near flow of each mode without A; zero for harmonics."""
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    nu = (node + 1) / 2
+    points = np.stack([np.sqrt(1 - nu**2), 0 * nu, 0 * nu], axis=-1)
+    return jnp.where(modes.m == 0, _tube(pressure_functions, modes, jnp.asarray(points), wake) @ (nu * weight), 0.0)
+
+
+def disk_means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
+    """Return the area-weighted mean inflow of each mode's unit state: 2/√3 of the first, as in the cylinder."""
+    return 2 / sqrt(3) / _means(FIRST, wake)[0] * _means(modes, wake)
+
+
+def disk_flow(
+    modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"], wake: Contraction
+) -> Float[Array, "M ..."]:
+    """Return the inflow of each mode's unit state, positive down, at stations (x, y) of the disk, over R."""
+    points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
+    return near_flow(pressure_functions, modes, points, wake)
+
+
+def near_flow(
+    functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
+) -> Float[Array, "..."]:
+    """Return near(p) of each mode's unit state. functions(modes, points): C, with the points' axes last."""
+    amplitude = jnp.where(modes.odd, 2 / sqrt(3) / _means(FIRST, wake)[0], 1.0)
+    return amplitude.reshape((-1,) + (1,) * (points.ndim - 1)) * _tube(functions, modes, points, wake)
+
+
+def far_flow(
+    functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
+) -> Float[Array, "..."]:
+    """Return far(p) of each mode's unit state: C of a cylinder of the contracted wake's radius."""
+    narrow = functions(modes, points / wake.radius)
+    if modes.parity == "odd":
+        return narrow
+    odd = jnp.asarray(modes.odd).reshape((-1,) + (1,) * (points.ndim - 1))
+    return jnp.where(odd, narrow, functions(modes, points))
+
+
+def wake_flow(
+    functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
+) -> Float[Array, "..."]:
+    """Return the velocity of each mode's unit state at any hub-frame points, over R: near above, far deep below."""
+    depth = jnp.maximum(-points[..., 2], 0.0)
+    near = jnp.exp(-depth / (wake.length + 1e-12))  # a wake that does not contract has no length
+    both = near_flow(functions, modes, points, wake), far_flow(functions, modes, points, wake)
+    return near * both[0] + (1 - near) * both[1]
