@@ -38,14 +38,16 @@ def programs():
 
 def test_a_wake_takes_few_programs(uh60, coarse, programs):
     """One that evaluates, one that multiplies, one that reads off, and what lays out the start."""
-    hover = solve(free_wake(*uh60, None, coarse))
+    free, low, high = (free_wake(*uh60, g, coarse) for g in (None, plane(1.0), plane(1.3)))
+    programs.clear()
+    hover = solve(free)
     assert hover.converged
     assert len(programs) <= 15, programs
     programs.clear()
-    assert solve(free_wake(*uh60, plane(1.0), coarse), hover).converged
+    assert solve(low, hover).converged
     assert len(programs) <= 8, programs
     programs.clear()
-    assert solve(free_wake(*uh60, plane(1.3), coarse), hover).converged
+    assert solve(high, hover).converged
     assert not programs
 
 
