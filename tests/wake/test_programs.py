@@ -51,7 +51,7 @@ def test_a_wake_takes_few_programs(uh60, coarse, programs):
     assert not programs
 
 
-@pytest.mark.parametrize(("ground", "most"), [(None, 120), (plane(1.0), 165)], ids=["free", "level"])
+@pytest.mark.parametrize(("ground", "most"), [(None, 105), (plane(1.0), 140)], ids=["free", "level"])
 def test_an_evaluation_is_a_short_program(uh60, ground, most):
     model = free_wake(*uh60, ground, wake_settings(**COARSE))
     arrays, rest = eqx.partition(model, eqx.is_array)
