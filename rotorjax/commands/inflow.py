@@ -40,7 +40,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--netcdf", type=Path, metavar="FILE", help="all arrays, labelled")
     add_harmonics(parser)
     add_calibration(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, free_wake=lambda chosen: chosen.model != "vpbfsm")
 
 
 def run(chosen: argparse.Namespace) -> int:

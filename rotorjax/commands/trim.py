@@ -29,7 +29,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     add("--json", type=Path, metavar="FILE", help="all numbers; of a curve a list of them under `points`")
     add("--plot", type=Path, metavar="FILE", help="picture of a curve: .png, .pdf or .svg")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, free_wake=lambda chosen: chosen.inflow == "freewake")
 
 
 def run(chosen: argparse.Namespace) -> int:
