@@ -28,6 +28,17 @@ class Limits(NamedTuple):
     why: str
 
 
+def markdown() -> str:
+    """`TABLE` as docs/limits.md holds it."""
+    rows = [
+        f"| {name} | {limits.height:g} | {limits.clearance:g} | {limits.slope:g} | {limits.advance:g} | "
+        f"{', '.join(limits.states)} | {limits.why} |"
+        for name, limits in TABLE.items()
+    ]
+    head = "| model | height over R, at least | rim over R | slope, deg, at most | μ, at most | axial flight | why |"
+    return "\n".join([head, "|---" * 7 + "|", *rows])
+
+
 _UPRIGHT: tuple[FlightState, ...] = ("hover", "climb", "slow descent")
 _ALL: tuple[FlightState, ...] = (*_UPRIGHT, "windmill brake")
 TABLE: dict[str, Limits] = {

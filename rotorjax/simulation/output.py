@@ -14,6 +14,7 @@ from rotorjax.bench import plotting
 from rotorjax.bench.film import write_film
 from rotorjax.coupled import inflow_velocity, stations
 from rotorjax.coupled_wake import CoupledWake
+from rotorjax.inflow.momentum import in_vortex_ring
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import ATTITUDE
 from rotorjax.simulation.ground_view import ground_arrays, ground_line
@@ -116,12 +117,20 @@ def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
         "march_s": found.march_s,
         "march_s_per_revolution": found.march_s / turns,
         "real_time_factor": flown_s / found.march_s,
+        "vortex_ring_s": vortex_ring(found, data["time"].values),
         **_of_the_wake(data),
         "histories": {
             n: {"first": v[0], "last": v[-1], "min": float(np.min(v)), "max": float(np.max(v))}
             for n, v in series.items()
         },
     }
+
+
+def vortex_ring(found: Simulated, time: np.ndarray) -> float:
+    """Seconds of a flight in the vortex ring state, by C_T and the hub's velocities along and across the shaft."""
+    u, thrust = found.flown.u, np.asarray(found.flown.y.CT)
+    within = in_vortex_ring(thrust, -np.asarray(u.w), np.hypot(np.asarray(u.u), np.asarray(u.v)))
+    return float(np.sum(np.diff(time) * within[1:]))
 
 
 def _of_the_wake(data: xr.Dataset) -> dict[str, Any]:

@@ -11,6 +11,8 @@ directions is taken, which is right for a filament that runs straight on. A segm
 axis: the velocity there is zero by convention and has no meaningful derivative.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -109,8 +111,9 @@ def lattice_velocity(
     )
 
 
+@partial(jax.jit, static_argnames=("settings", "blades"))
 def _velocity(settings, points, start, end, strength, core, plane: Plane | None, blades: int):
-    """Sum over the segments, the other blades and the mirror image.
+    """Sum over the segments, the other blades and the mirror image: one program, also where nothing else is compiled.
 
     A copy's velocity is the segments' own at the point turned (or reflected) back, turned (or reflected) with the copy.
     """

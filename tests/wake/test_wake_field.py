@@ -8,13 +8,17 @@ import pytest
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import plane
+from rotorjax.wake import equilibrium, field
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.equilibrium import full_state, spread
-from rotorjax.wake.field import node_velocities, self_induction, velocity, wake_segments
+from rotorjax.wake.equilibrium import spread
+from rotorjax.wake.field import self_induction
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.start import prescribed
 
+full_state, node_velocities, velocity, wake_segments = map(
+    eqx.filter_jit, (equilibrium.full_state, field.node_velocities, field.velocity, field.wake_segments)
+)
 POINTS = jnp.array([[0.3, 0.2, -0.1], [0.7, -0.4, 0.2], [0.0, 0.0, -0.3], [1.1, 0.5, -0.05]])
 
 
