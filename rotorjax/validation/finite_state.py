@@ -18,7 +18,7 @@ from rotorjax.validation.row import Against, Row, absolute, between
 from rotorjax.wake.solution import Solution
 
 NAME = "finite-state"
-HEIGHTS, SLOPES = (3.0, 2.0, 1.5, 1.0, 0.75), (10.0, 20.0, 30.0)  # slopes at h = 1
+HEIGHTS, SLOPES = (3.0, 2.0, 1.5, 1.0, 0.75), (10.0, 15.0, 30.0)  # slopes at h = 1
 MEASURED = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 # wakes that the default's length and clearance were rounded from; all others are held out
 CHOSEN_ON = ((None, 0.0), (1.0, 0.0))

@@ -43,11 +43,11 @@ def test_one_azimuth_of_the_quadrature_is_exact():
         np.testing.assert_allclose(mean_inflow(steady_state(model, data.tau[0]), model) / alone, ratio, rtol=1e-9)
 
 
-@pytest.mark.parametrize("shape", ["elliptic", "triangular"])
-def test_the_default_is_near_hayden_without_a_fit(shape):
-    data, parameters = hayden.hayden_data(shape=shape)
-    left = hayden.residual(jnp.asarray(parameters.printed), data)
-    assert float(jnp.sqrt(jnp.mean(left**2))) < 0.04
+def test_the_default_follows_hayden_without_a_fit():
+    """With the UH-60's loads of the free wake out of ground effect at 18°."""
+    tau = np.array([2.632e-3, -1.652e-3, 6.03e-4])
+    data, parameters = hayden.hayden_data(tau=(np.tile(tau, (6, 1)), tau))
+    assert float(jnp.sqrt(jnp.mean(hayden.residual(jnp.asarray(parameters.printed), data) ** 2))) < 0.03
 
 
 def test_the_clearance_alone_at_one_height_is_the_same_from_every_start():

@@ -62,7 +62,7 @@ def check_trim(model, choices, **tolerance):
     expected = steady_state(steady, found.tau)
     np.testing.assert_allclose(state.a, expected.a, rtol=0.0, **tolerance)
     np.testing.assert_allclose(found.uniform, mean_inflow(expected, steady), rtol=1e-5)  # the table's accuracy
-    assert found.cosine < -0.0015  # less inflow where the ground is near
+    assert found.cosine < -0.0005  # less inflow where the ground is near
     assert abs(found.sine) < 1e-12
 
 
