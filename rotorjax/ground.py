@@ -76,16 +76,16 @@ def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
-    if number_of(height) not in Range(0.0, above=True) and known(height):
+    if known(height) and number_of(height) not in Range(0.0, above=True):
         found = f"{height}" if isinstance(height, int | float) else shown(height)
         raise refuse("height", "be positive and finite (hub above ground, over R)", found)
     if known(slope_deg) and not 0 <= number_of(slope_deg) < 60:
         found = f"{slope_deg}" if isinstance(slope_deg, int | float) else shown(slope_deg)
         raise refuse("slope_deg", "lie in [0, 60) degrees", found)
-    if known(height, slope_deg) and height <= math.tan(math.radians(slope_deg)):
-        clearance = math.tan(math.radians(slope_deg))
+    clearance = math.tan(math.radians(number_of(slope_deg))) if known(slope_deg) else -math.inf
+    if known(height) and number_of(height) <= clearance:
         raise refuse(
             "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
         )
-    slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
+    slope = math.radians(number_of(slope_deg)) if known(slope_deg) else jnp.deg2rad(slope_deg)
     return Plane(array(height), array(slope))
