@@ -97,8 +97,10 @@ def _checked_table(table: str, values: dict[str, Any], keys: Mapping[str, Key]) 
     for name, key in keys.items():
         if key.required and name not in values:
             raise InputError(f"[{table}] must have the key '{name}' ({key.kind}), but it is missing")
-    others = keys.get(OTHERS, Key("anything"))
-    return {name: value_of(f"[{table}] {name}", value, keys.get(name, others)) for name, value in values.items()}
+    return {
+        name: value_of(f"[{table}] {name}", value, keys[name if name in keys else OTHERS])
+        for name, value in values.items()
+    }
 
 
 def value_of(where: str, value: Any, key: Key) -> Any:
