@@ -76,7 +76,7 @@ def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
 
     Raises InputError where the height is not positive, the slope is not in [0°, 60°), or the disk would cut the plane.
     """
-    if number_of(height) not in Range(0.0, above=True) and known(height):
+    if known(height) and number_of(height) not in Range(0.0, above=True):
         found = f"{height}" if isinstance(height, int | float) else shown(height)
         raise refuse("height", "be positive and finite (hub above ground, over R)", found)
     if known(slope_deg) and not 0 <= number_of(slope_deg) < 60:

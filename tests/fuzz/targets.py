@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 from rotorjax import cli
-from rotorjax.calibration.calibration_file import MODEL_VERSION, Calibration
+from rotorjax.calibration.calibration_file import MODEL_VERSION, SETS, Calibration
 from rotorjax.calibration.calibration_file import load as load_calibration
 from rotorjax.deck.case import read_case as read_deck
 from rotorjax.errors import InputError
@@ -269,6 +269,7 @@ first_moment = 0.55
 flap_inertia = 0.33
 lag_spring = 1.0
 """
+PARAMETERS = "\n".join(f"{p.name} = {0.5 * (p.lower + p.upper):g}" for p in SETS["hayden"].parameters)
 CALIBRATION = f"""
 [calibration]
 set = "hayden"
@@ -277,8 +278,7 @@ rotorjax = "0.1.0"
 converged = true
 rms_error = 0.00355
 [parameters]
-b = 0.0917
-p = 1.276
+{PARAMETERS}
 [fitted_with]
 loading = "elliptic"
 """
