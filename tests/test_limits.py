@@ -89,11 +89,11 @@ def test_one_pressure_term_has_momentum_theorys_mean_inflow_in_every_state():
 @pytest.mark.slow
 @pytest.mark.parametrize("climb", [-0.25, -0.02, 0.0])
 def test_the_rotors_own_loads_keep_the_branch(climb):
-    """Mean inflow within a quarter of momentum theory's at its C_T, where the climb branch gives 4 times as much."""
+    """Mean inflow within a fifth of momentum theory's at its C_T, where the climb branch gives 4 times as much."""
     result, total, _ = alone(Case(), study_settings("uh60", climb_ratio=climb))
     thrust = float(total.thrust)
     assert flight_state(thrust, climb) == {-0.25: "windmill brake", -0.02: "slow descent", 0.0: "hover"}[climb]
-    np.testing.assert_allclose(result.mean_inflow, induced_inflow(thrust, climb), rtol=0.25)
+    np.testing.assert_allclose(result.mean_inflow, induced_inflow(thrust, climb), rtol=0.2)
 
 
 @pytest.mark.slow

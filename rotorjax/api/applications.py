@@ -89,7 +89,7 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
     values in `.fit`. Raises InputError for an unknown target and as they do.
 
     >>> import rotorjax as rj
-    >>> sorted(rj.calibrate("hayden", parameters=("b",)).fits)
+    >>> sorted(rj.calibrate("hayden", parameters=("radius",)).fits)
     ['adam', 'lbfgs', 'least_squares']
     """
     from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher

@@ -49,16 +49,8 @@ def dataset(found: Simulated) -> xr.Dataset:
     )
     for name in ("CT", "CQ"):
         data[f"trim_{name}"] = ((), getattr(found.start, name), {"long_name": "mean over a revolution of the trim"})
+    data = data.assign(_inputs(found, tip))
     data["azimuth"] = ("time", np.asarray(x.psi), {"units": "rad"})
-    for name in ("theta_0", "theta_1c", "theta_1s"):
-        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
-    for name in ("u", "v", "w"):
-        data[name] = ("time", np.asarray(getattr(u, name)) * tip, {"units": "m/s"})
-    for name in ("p", "q", "r"):
-        data[name] = ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"})
-    data["rotor_speed"] = ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})
-    for name in ATTITUDE:
-        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
     if u.height is not None:
         data = data.assign(ground_arrays(u, found.case.request.slope_deg))
     data["flap"] = (("time", "coordinate"), np.rad2deg(x.rotor.flap), degrees)
@@ -73,6 +65,16 @@ def dataset(found: Simulated) -> xr.Dataset:
     at = np.arange(0, count, max(1, -(-count // _MOST_FRAMES)))
     data = data.assign(_frames(found, at))
     return data.assign(wake_arrays(found, at)) if isinstance(p, CoupledWake) else data
+
+
+def _inputs(found: Simulated, tip: float) -> dict[str, tuple]:
+    """Controls, hub motion and attitude; tip: ΩR in m/s."""
+    u, omega = found.flown.u, float(found.start.p.operating.omega)
+    angles = ("theta_0", "theta_1c", "theta_1s", *ATTITUDE)
+    told = {name: ("time", np.rad2deg(getattr(u, name)), {"units": "deg"}) for name in angles}
+    told |= {name: ("time", np.asarray(getattr(u, name)) * tip, {"units": "m/s"}) for name in ("u", "v", "w")}
+    told |= {name: ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"}) for name in ("p", "q", "r")}
+    return told | {"rotor_speed": ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})}
 
 
 def _frames(found: Simulated, at: np.ndarray) -> dict[str, xr.DataArray]:

@@ -181,7 +181,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
         "CP_damper": flown.CP_damper,
-        "hub_roll_moment": -float(flown.moment[0]),
+        "hub_roll_moment": -request.rotor.side * float(flown.moment[0]),
         "hub_pitch_moment": float(flown.moment[1]),
         "figure_of_merit": figure_of_merit(flown.CT, flown.CQ, request),
         "wall_time_s": result.wall_time_s,

@@ -30,7 +30,7 @@ def _introduction(found: Validation) -> str:
     return (
         f"Written by `{how} --out DIR`. Every rotor has the same {kind} settings; none is tuned for a case. "
         "Lengths are over R, velocities over ΩR, C_T = T/(ρA(ΩR)²). A row is met where the number lies in the allowed "
-        "range, and out where it does not or a wake of the case did not converge.\n\n"
+        "range, and out where it does not or a wake that it is read from did not converge.\n\n"
         f"{len(found.rows) - len(found.out)} of {len(found.rows)} rows are met. {len(found.wakes)} wakes in "
         f"{found.wall_time_s:.0f} s, two at a time. {told}"
     )

@@ -31,7 +31,7 @@ class Row:
     """A row of the validation's table.
 
     case: its case's name. quantity: in words, the place included. ours: the free wake's number. note: what else has to
-    be known, such as a wake that did not converge.
+    be known, such as a wake that did not converge. wakes: labels of those that it is read from; none: all of its case.
     """
 
     case: str
@@ -40,6 +40,7 @@ class Row:
     limits: Limits
     against: Against
     note: str = ""
+    wakes: tuple[str, ...] = ()
 
     @property
     def met(self) -> bool:

@@ -55,7 +55,7 @@ def validate(
     solver: Solver = solve,
     workers: int = 2,
 ) -> Validation:
-    """Solve all wakes of the cases and compare. Every row of a case one of whose wakes did not converge is out.
+    """Solve all wakes of the cases and compare. Every row that is read from a wake that did not converge is out.
 
     show: progress bar on stderr. workers: threads. Raises InputError where a rotor or a setting is not allowed.
     """
@@ -102,7 +102,10 @@ def _ordered(cases: Sequence[ValidationCase], subject: Subject) -> list[Point]:
 def _compare(case: ValidationCase, subject: Subject, wakes: dict[Point, Solution]) -> Comparison:
     failed = [p.label for p in case.points(subject) if not wakes[p].converged]
     found = case.compare(subject, wakes)
-    if not failed:
-        return found
-    note = "not converged: " + "; ".join(failed)
-    return replace(found, rows=[replace(row, ours=float("nan"), note=note) for row in found.rows])
+    return replace(found, rows=[_without(row, failed) for row in found.rows])
+
+
+def _without(row: Row, failed: list[str]) -> Row:
+    """The row, out where one of its wakes failed."""
+    missing = [label for label in failed if not row.wakes or label in row.wakes]
+    return replace(row, ours=float("nan"), note="not converged: " + "; ".join(missing)) if missing else row

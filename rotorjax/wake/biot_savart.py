@@ -121,7 +121,7 @@ def _velocity(settings, points, start, end, strength, core, plane: Plane | None,
         return jnp.zeros_like(points)
     soft = jnp.sum((end - start) ** 2, axis=1) * core**2
     segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
-    angles = (2 * np.pi / blades * np.arange(blades, dtype=points.dtype))[:, None]
+    angles = jnp.asarray(2 * np.pi / blades * np.arange(blades)[:, None], points.dtype)
     sides = points[None] if plane is None else jnp.stack([points, plane.reflect_points(points)])
     # one sum for all copies, (sides, blades, N, 3)
     copies = jnp.broadcast_to(sides[:, None], (len(sides), blades, *points.shape))

@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 from rotorjax import cli
-from rotorjax.calibration.calibration_file import Calibration
+from rotorjax.calibration.calibration_file import MODEL_VERSION, Calibration
 from rotorjax.calibration.calibration_file import load as load_calibration
 from rotorjax.deck.case import read_case as read_deck
 from rotorjax.errors import InputError
@@ -269,10 +269,10 @@ first_moment = 0.55
 flap_inertia = 0.33
 lag_spring = 1.0
 """
-CALIBRATION = """
+CALIBRATION = f"""
 [calibration]
 set = "hayden"
-model_version = 1
+model_version = {MODEL_VERSION}
 rotorjax = "0.1.0"
 converged = true
 rms_error = 0.00355

@@ -5,17 +5,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from rotorjax.errors import InputError
 from rotorjax.reference.published import Hover, Path, induced_power_factor, knight_hefner
 from rotorjax.reference.published import caradonna_tung as caradonna_tung_data
 from rotorjax.rotor.catalogue import load
 from rotorjax.validation import caradonna_tung, grid, ground, momentum, polars, step
-from rotorjax.validation.case import Subject
+from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.cases import CASES, chosen_cases
 from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import needed, point, twist_of
+from rotorjax.validation.row import Row, between
+from rotorjax.validation.run import _compare
 
 
 def test_the_tip_vortex_starts_on_the_blade_and_is_the_solutions_own(coarse_hover):
@@ -86,6 +89,23 @@ def test_the_grids_wakes_differ_in_one_number_and_each_near_the_ground_has_one_t
     assert {base.slope_deg for base, _ in pairs} == {0.0, 10.0, 20.0, 30.0}
     for task in tasks:
         assert (needed(task, tasks) is None) == (task.height is None)
+
+
+def test_a_wake_that_fails_takes_out_the_rows_that_are_read_from_it(coarse_hover):
+    """And of a case that does not say which, all."""
+    lost, free = point("uh60", 18.0, 0.5, free_turns=4.0), point("uh60")
+    wakes = {at: replace(coarse_hover, converged=at != lost) for at in (free, lost)}
+    rows = [Row("some", name, 1.0, between(0, 2), grid.COARSE, wakes=of) for name, of in READ_FROM.items()]
+    some = ValidationCase("some", "Some", lambda s: (free, lost), lambda s, w: Comparison(rows, Figure))
+    met = {row.quantity: row.met for row in _compare(some, Subject(), wakes).rows}
+    assert met == {"free alone": True, "both": False, "of the case": False}
+
+
+READ_FROM = {
+    "free alone": ("uh60 18°, OGE",),
+    "both": ("uh60 18°, OGE", "uh60 18°, h = 0.5, free_turns 4"),
+    "of the case": (),
+}
 
 
 def test_a_harmonics_change_counts_phase_and_size(coarse_hover):
