@@ -66,6 +66,7 @@ def test_summary_entries_have_the_agreed_keys(studied):
             "slope_deg",
             "free_wake",
             "vpbfsm",
+            "finite_state",
             "inflow_rms_difference",
             "wall_time_s",
             "compile_time_s",
