@@ -146,7 +146,8 @@ def _slopes_differ(height: float) -> float:
     """Share by which the slopes of what is known of ground effect over height differ, of their mean."""
     step = 0.1  # as far apart as the measured curve's points
     known = (reference.hayden, reference.cheeseman_bennett, reference.isolated_rotors)
-    slopes = [f(height + step) - f(height - step) for f in known]
+    ends = np.array([[f(height + step), f(height - step)] for f in known], float)  # NaN beyond a curve's end
+    slopes = ends[:, 0] - ends[:, 1]
     return float(np.ptp(slopes) / np.mean(slopes))
 
 
