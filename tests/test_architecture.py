@@ -18,6 +18,7 @@ FLOORS = (  # from the ground up; a room may import from lower floors, and from 
     ("bench",),
     ("trim", "linearisation", "calibration", "simulation", "deck"),
     ("study", "validation"),
+    ("api",),
     ("commands",),
     ("cli",),
 )

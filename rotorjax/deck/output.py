@@ -128,11 +128,11 @@ def _mesh(data: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _disk_axes(axes: Any, title: str) -> None:
-    axes.set(aspect="equal", xticks=[], yticks=[], title=title, ylabel="seen from above")
+    axes.set(aspect="equal", xticks=[], yticks=[], title=title)
     axes.grid(visible=False)
     for side in axes.spines.values():
         side.set_visible(False)
-    axes.set_xlabel("forward ← → aft", fontsize=8)
+    axes.set_xlabel("forward ← → aft\nseen from above", fontsize=8)
 
 
 def animation(data: xr.Dataset, path: str | Path, frames_per_second: int = 12) -> None:
