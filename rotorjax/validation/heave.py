@@ -40,7 +40,7 @@ INFLOW = Against(
 )
 GAIN = Against(
     SOURCE,
-    "the slopes of Hayden's and of Cheeseman and Bennett's formula over height differ by so much",
+    "the slopes over height of the measured curve, Hayden's and Cheeseman and Bennett's formula differ by so much",
     "the uncertainty of ground effect",
 )
 LINEAR = Against(
@@ -145,8 +145,12 @@ def _phase_row(name: str, z: Each[complex]) -> Row:
 def _slopes_differ(height: float) -> float:
     """Share by which the slopes of what is known of ground effect over height differ, of their mean."""
     step = 0.1  # as far apart as the measured curve's points
-    known = (reference.hayden, reference.cheeseman_bennett, reference.isolated_rotors)
-    slopes = [f(height + step) - f(height - step) for f in known]
+    known: tuple[Callable[[float], Any], ...] = (
+        reference.hayden,
+        reference.cheeseman_bennett,
+        reference.isolated_rotors,
+    )
+    slopes = np.diff([[f(height + by) for f in known] for by in (-step, step)], axis=0)
     return float(np.ptp(slopes) / np.mean(slopes))
 
 

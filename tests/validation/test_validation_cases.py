@@ -115,7 +115,7 @@ def test_a_harmonics_change_counts_phase_and_size(coarse_hover):
     ]
     larger = replace(there[0], inflow=1.1 * there[0].inflow)
     assert grid.harmonic_change(there[0], larger, grid.FIRST["inflow"]) == pytest.approx(0.1)
-    assert grid.harmonic_change(*there, grid.FIRST["inflow"]) == pytest.approx(np.sqrt(2))
+    assert grid.harmonic_change(there[0], there[1], grid.FIRST["inflow"]) == pytest.approx(np.sqrt(2))
 
 
 def test_the_isolated_rotors_curve_judges_a_model_rotor_and_hayden_joins_in_for_a_helicopters():
