@@ -12,8 +12,9 @@ from rotorjax import __version__
 from rotorjax.errors import InputError
 
 DIVERGED, BAD_INPUT, FAULT, INTERRUPTED, CLOSED = 1, 2, 70, 130, 141
-# XLA's older way to write fused loops: the same sums in the same time, and half to compile (benchmarks/xla_flags.py)
-XLA_FLAGS = "--xla_cpu_use_fusion_emitters=false"
+# XLA's older way to write fused loops takes a third less to compile and as long to run, but for the derivative of the
+# Biot-Savart sum, which takes twice as long: not where a free wake is solved (benchmarks/xla_flags.py)
+WITHOUT_FREE_WAKE = "--xla_cpu_use_fusion_emitters=false"
 
 
 class Parser(argparse.ArgumentParser):
@@ -46,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parsed(sys.argv[1:] if arguments is None else arguments)
     programs = None
     try:
-        programs = _set_up_jax()
+        programs = _set_up_jax("" if _solves_free_wake(chosen) else WITHOUT_FREE_WAKE)
         return chosen.run(chosen)
     except InputError as error:
         return _left(chosen, BAD_INPUT, f"error: {' '.join(str(error).split())}")
@@ -90,8 +91,13 @@ def _fault(error: Exception) -> str:
     )
 
 
-def _set_up_jax() -> Path | None:
-    """Double precision, quick compilation, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR says where.
+def _solves_free_wake(chosen: argparse.Namespace) -> bool:
+    """Whether a command solves a free wake: all do that do not say what it depends on."""
+    return not hasattr(chosen, "free_wake") or chosen.free_wake(chosen)
+
+
+def _set_up_jax(xla_flags: str = "") -> Path | None:
+    """Double precision, XLA's flags, and compiled programs kept unless JAX_COMPILATION_CACHE_DIR says where.
 
     Returns the folder of programs where it is ours. For each program that it takes from there XLA prints that this
     processor lacks "prefer-no-gather", which is no feature of processors but a hint of its own; its real errors come as
@@ -99,7 +105,7 @@ def _set_up_jax() -> Path | None:
     """
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # read when jax is imported
     if "jax" not in sys.modules:
-        os.environ["XLA_FLAGS"] = f"{XLA_FLAGS} {os.environ.get('XLA_FLAGS', '')}".strip()  # the user's own come last
+        os.environ["XLA_FLAGS"] = f"{xla_flags} {os.environ.get('XLA_FLAGS', '')}".strip()  # the user's own come last
     import jax
 
     jax.config.update("jax_enable_x64", True)

@@ -17,6 +17,7 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.inflow.interface import DiskLoads, InflowModel
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import flap_lag, multiblade
+from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.flap_lag import Blade, blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs, TurningFrame, pitch, turning_frame
@@ -93,7 +94,11 @@ class _Evaluation(NamedTuple):
 
 
 def coupled_rotor(rotor: Rotor, operating: OperatingPoint, inflow: InflowModel, panels: int = 24) -> CoupledRotor:
-    """Couple a rotor with an inflow model. Raises InputError where the rotor has no hinge data."""
+    """Couple a rotor with an inflow model.
+
+    Raises InputError where the rotor has no hinge data, or its solidity or tip Mach number is beyond sense.
+    """
+    check_rotor(rotor, operating)
     return CoupledRotor(rotor, operating, blade_of(rotor, operating), inflow, panels)
 
 

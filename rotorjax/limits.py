@@ -28,12 +28,23 @@ class Limits(NamedTuple):
     why: str
 
 
+def markdown() -> str:
+    """`TABLE` as docs/limits.md holds it."""
+    rows = [
+        f"| {name} | {limits.height:g} | {limits.clearance:g} | {limits.slope:g} | {limits.advance:g} | "
+        f"{', '.join(limits.states)} | {limits.why} |"
+        for name, limits in TABLE.items()
+    ]
+    head = "| model | height over R, at least | rim over R | slope, deg, at most | μ, at most | axial flight | why |"
+    return "\n".join([head, "|---" * 7 + "|", *rows])
+
+
 _UPRIGHT: tuple[FlightState, ...] = ("hover", "climb", "slow descent")
 _ALL: tuple[FlightState, ...] = (*_UPRIGHT, "windmill brake")
 TABLE: dict[str, Limits] = {
     "uniform": Limits(0.5, 0.5, 0.0, 0.5, _ALL, "momentum theory; Cheeseman and Bennett's source over ground"),
     "pitt-peters": Limits(0.5, 0.5, 0.0, 0.5, _ALL, "momentum theory; Cheeseman and Bennett's source over ground"),
-    "vpbfsm": Limits(0.3, 0.05, 59.9, 0.5, _ALL, "Hayden's measurements begin at 0.3; below 0.2 the inflow turns up"),
+    "vpbfsm": Limits(0.3, 0.05, 59.9, 0.5, _ALL, "Hayden's measurements begin at 0.3"),
     "freewake": Limits(0.3, 0.05, 59.9, 0.5, _UPRIGHT, "wakes that leave the disk downward are what was verified"),
 }
 CLIMB = Range(-0.3, 0.5, "ΩR", hint="beyond, most of the blade is stalled or unloaded")
@@ -43,6 +54,8 @@ def check_place(model: str, height: float | None, slope_deg: float = 0.0) -> Non
     """Raise InputError where a hub at a height over R, over ground of a slope, is beyond a model."""
     if height is None:
         return
+    check_range("height", height, Range(0.0, 1000.0, "R", above=True))
+    check_range("slope_deg", slope_deg, Range(0.0, 60.0, "deg"))
     limits, slope = TABLE[model], np.deg2rad(slope_deg)
     if height < limits.height:
         raise InputError(

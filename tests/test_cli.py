@@ -10,7 +10,7 @@ import pytest
 from wakes import fails_at, made_up
 
 from rotorjax.bench.single import single_case
-from rotorjax.cli import main
+from rotorjax.cli import WITHOUT_FREE_WAKE, main
 from rotorjax.io import netcdf
 from rotorjax.study.run import solve_cases
 
@@ -192,6 +192,29 @@ def test_compiled_programs_are_kept_for_the_next_run(tmp_path):
 
     assert Path(folder(XDG_CACHE_HOME=str(tmp_path)).strip()).parent == tmp_path / "rotorjax" / "programs"
     assert folder(JAX_COMPILATION_CACHE_DIR="elsewhere").strip() == "elsewhere"
+
+
+FLAGS = """
+import sys, os
+from rotorjax import cli
+from rotorjax.commands import inflow, trim
+inflow.run = trim.run = lambda _: print("FLAGS", os.environ["XLA_FLAGS"]) or 0
+cli.main(sys.argv[1:])
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "quick"),
+    [("inflow", False), ("inflow --model vpbfsm", True), ("trim --thrust-coefficient 0.006", True)],
+)
+def test_only_what_solves_no_free_wake_is_compiled_the_older_way(line, quick):
+    env = {k: v for k, v in os.environ.items() if k != "XLA_FLAGS"} | {"XLA_FLAGS": "--xla_cpu_enable_fast_math=false"}
+    run = subprocess.run(
+        [sys.executable, "-c", FLAGS, *line.split()], env=env, capture_output=True, text=True, check=True
+    )
+    flags = run.stdout.split()[1:]
+    assert flags[-1] == "--xla_cpu_enable_fast_math=false"  # the user's own count
+    assert (WITHOUT_FREE_WAKE in flags) == quick
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])

@@ -13,6 +13,7 @@ import pytest
 from rotorjax.errors import InputError
 from rotorjax.rotor import catalogue, geometry
 from rotorjax.rotor.airfoil import lift_drag
+from rotorjax.simulation.case import read_case
 
 REPORTS = Path(__file__).parent / "data" / "reports"
 ROTOR = """
@@ -152,8 +153,15 @@ def test_linear_twist_is_zero_at_three_quarters(tmp_path):
 
 
 def test_a_clockwise_rotor_is_told(tmp_path):
+    """Its sense stays with it, and flights to one side are refused rather than mirrored without a word."""
+    (tmp_path / "case.toml").write_text(
+        '[flight]\nrotor = "rotor.toml"\nthrust_coefficient = 0.006\n[time]\nduration = 1.0\n'
+        "[history]\nt = [0.0, 1.0]\np_deg = [0.0, 1.0]\n"
+    )
     rotor, _ = own(tmp_path, ROTOR.replace("chord", 'rotation = "clockwise"\nchord', 1))
     assert (rotor.rotation, rotor.side) == ("clockwise", -1.0)
+    with pytest.raises(InputError, match=r"\[history\] p_deg must be 0 for a clockwise rotor"):
+        read_case(tmp_path / "case.toml")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1"])

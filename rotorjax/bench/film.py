@@ -9,6 +9,7 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
+from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_bytes
 
 
@@ -35,7 +36,17 @@ def write_film(
             return []
 
         film = FuncAnimation(figure, again, frames=frames, blit=False)
-        with tempfile.TemporaryDirectory(prefix="rotorjax-") as folder:  # matplotlib writes films to paths only
+        write_bytes(path, _saved(film, frames_per_second))
+
+
+def _saved(film: FuncAnimation, frames_per_second: int) -> bytes:
+    """The film as a file's content, by way of a temporary file: matplotlib writes films to paths only."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="rotorjax-") as folder:
             made = Path(folder) / "film.gif"
             film.save(made, writer=PillowWriter(fps=frames_per_second))
-            write_bytes(path, made.read_bytes())
+            return made.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{tempfile.gettempdir()}: the folder for temporary files must take a film, but does not: {error.strerror}"
+        ) from None

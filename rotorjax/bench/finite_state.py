@@ -4,7 +4,7 @@ All that a case needs is evaluated at once, in one compiled function that every 
 evaluation of the Legendre functions costs seconds of compilation and microseconds of work.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
-from rotorjax.inflow.momentum import VORTEX_RING
+from rotorjax.inflow.balance import Balance, Stations, axial_state, balance, pressure, stations_of
 from rotorjax.limits import check_axial, check_flight
 from rotorjax.potential import loading, rigid_cylinder
 from rotorjax.potential.ground_source import DiskQuadrature
@@ -25,24 +25,12 @@ from rotorjax.potential.model import (
     finite_state_model,
     ground_normal_velocity_rms,
     mean_inflow,
-    steady_state,
 )
-from rotorjax.rotor.blade_element import RotorCoefficients, SectionLoads, disk_loading, section_loads
-from rotorjax.rotor.blade_element import rotor_coefficients as coefficients_of
 
 GRID_R = np.linspace(0.0, 1.0, 64)  # 64 × 72 points of the disk for pictures
 GRID_PSI = np.linspace(0.0, 2 * np.pi, 72, endpoint=False)
 DIAMETER_PSI = np.array([0.0, np.pi])  # mountain side, valley side
 PATCH = DiskQuadrature(48, 64)  # of the exact image's source patch on a slope
-ALONE_AZIMUTHS, ALONE_PANELS = 24, 48
-
-
-class Stations(eqx.Module):
-    """Where the blades carry load. r, widths (R,): over R. psi (K,): equally spaced azimuths over one turn (rad)."""
-
-    r: Float[Array, " R"]
-    widths: Float[Array, " R"]
-    psi: Float[Array, " K"]
 
 
 class FiniteStateResult(NamedTuple):
@@ -105,7 +93,7 @@ def from_loads(case: Case, settings: StudySettings, dct_dr: np.ndarray, stations
     loads = jnp.broadcast_to(jnp.asarray(dct_dr, float), (stations.psi.size, stations.r.size))
     if not bool(jnp.all(jnp.isfinite(loads))):
         raise InputError("Argument `dct_dr` must be finite throughout, but is not")
-    tau = _pressure(loads, stations, model)
+    tau = pressure(loads, stations, model)
     thrust = float(loading.thrust_coefficient(tau, model.modes))
     if thrust <= 0:
         raise InputError(f"Argument `dct_dr` must carry a positive thrust, but its C_T is {thrust:.3g}")
@@ -115,25 +103,6 @@ def from_loads(case: Case, settings: StudySettings, dct_dr: np.ndarray, stations
 def of_pressure(case: Case, settings: StudySettings, tau: np.ndarray, stations: Stations) -> FiniteStateResult:
     """The VPBFSM of given pressure coefficients (M,) with positive thrust."""
     return evaluate(models_of(case, settings), jnp.asarray(tau), stations, jnp.asarray(settings.climb_ratio))
-
-
-def axial_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
-    """Steady states in any axial flight that momentum theory knows; a thrust down is one up, upside down.
-
-    In the windmill brake state, out of ground effect, the air goes up with V_T = −(V_c + v) and V̄ = −(V_c + 2v); else
-    `steady_state`.
-    """
-    thrust = loading.thrust_coefficient(tau, model.modes)
-    sign = jnp.where(thrust < 0, -1.0, 1.0)
-    tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
-    windmill = climb <= VORTEX_RING[0] * hover
-    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb))
-    if model.ground is None:
-        inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
-        through, varying = inner - climb / 2, 2 * inner
-        braked = tau / jnp.where(model.varying, varying, through)
-        state = FiniteState(jnp.where(windmill, braked, state.a), state.c)
-    return FiniteState(sign * state.a, sign * state.c)
 
 
 @eqx.filter_jit
@@ -180,61 +149,16 @@ def evaluate(
     )
 
 
-def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, RotorCoefficients, Stations]:
-    """The VPBFSM with the blade-element loads of its own inflow: the pressure terms that reproduce themselves.
+def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Balance]:
+    """The VPBFSM with the blade-element loads of its own inflow (`inflow.balance`), and the rotor's coefficients.
 
-    Returns also the rotor's coefficients and the stations. No tip loss beyond what the expansion has. Raises InputError
-    where no such loading is found.
+    Raises InputError where no such loading is found, or the flight is beyond the model.
     """
-    edges = np.linspace(float(settings.rotor.root_cutout), 1.0, ALONE_PANELS + 1)
-    stations = Stations(
-        jnp.asarray(0.5 * (edges[1:] + edges[:-1])),
-        jnp.asarray(np.diff(edges)),
-        jnp.asarray(2 * np.pi / ALONE_AZIMUTHS * np.arange(ALONE_AZIMUTHS)),
-    )
     models = models_of(case, settings)
-    model = models[0]
     guess = check_axial("vpbfsm", settings.rotor, settings.operating)
-    start = jnp.zeros(len(model.modes)).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * guess)
-    tau, converged, total = _self_consistent(start, model, settings.rotor, settings.operating, stations)
-    thrust = float(loading.thrust_coefficient(tau, model.modes))
-    if not (bool(converged) and thrust * guess > 0):
-        raise InputError(
-            f"Argument `collective` must give a loading that thrusts upward, but at {settings.collective_deg:g} deg "
-            f"no steady one was found (residual tolerance {_tolerance(tau.dtype):.0e})"
-        )
-    check_flight("vpbfsm", thrust, settings.climb_ratio)
-    return evaluate(models, tau, stations, jnp.asarray(settings.climb_ratio)), total, stations
-
-
-@eqx.filter_jit
-def _self_consistent(start, model, rotor, operating, stations):
-    climb = operating.climb_ratio(rotor.radius)
-
-    def blade(tau) -> SectionLoads:
-        x, y = _polar(stations.r, stations.psi)
-        down = disk_inflow(axial_state(model, tau, climb), x, y, model) + climb
-        return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
-
-    def residual(tau, _):
-        return _pressure(disk_loading(rotor, blade(tau)), stations, model) - tau
-
-    import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
-
-    rtol = _tolerance(start.dtype)
-    found = optx.root_find(residual, optx.Newton(rtol=rtol, atol=rtol / 100), start, max_steps=50, throw=False)
-    total = coefficients_of(rotor, blade(found.value), stations.r, stations.widths)
-    return found.value, found.result == optx.RESULTS.successful, total
-
-
-def _tolerance(dtype: Any) -> float:
-    """Relative change of the pressure terms at which they count as found: 1e-10, or single precision's rounding."""
-    return 1e-10 if jnp.finfo(dtype).bits == 64 else 2e-5
-
-
-@eqx.filter_jit
-def _pressure(dct_dr, stations: Stations, model: FiniteStateModel):
-    return loading.from_distribution(dct_dr, stations.r, stations.widths, stations.psi, model.modes)
+    found = balance(models[0], settings.rotor, settings.operating, stations_of(settings.rotor), guess)
+    check_flight("vpbfsm", float(found.CT), settings.climb_ratio)
+    return evaluate(models, found.tau, found.stations, jnp.asarray(settings.climb_ratio)), found
 
 
 def _polar(r: Array, psi: Array) -> tuple[Array, Array]:

@@ -80,17 +80,17 @@ def solve_wake(
 
 def _finite_state_alone(case: Case, settings: StudySettings) -> xr.Dataset:
     start = time.perf_counter()
-    result, total, stations = finite_state.alone(case, settings)
+    result, found = finite_state.alone(case, settings)
     jax.block_until_ready(result)
     first = time.perf_counter() - start
     start = time.perf_counter()
     jax.block_until_ready(finite_state.alone(case, settings)[0])
     again = time.perf_counter() - start
     numbers = {
-        "CT": (float(total.thrust), "thrust coefficient T/(ρA(ΩR)²)"),
-        "CP": (float(total.power), "power coefficient P/(ρA(ΩR)³)"),
-        "CP_induced": (float(total.induced), "induced part of the power coefficient"),
-        "CP_profile": (float(total.profile), "profile part of the power coefficient"),
+        "CT": (float(found.CT), "thrust coefficient T/(ρA(ΩR)²)"),
+        "CP": (float(found.CP), "power coefficient P/(ρA(ΩR)³)"),
+        "CP_induced": (float(found.CP_induced), "induced part of the power coefficient"),
+        "CP_profile": (float(found.CP_profile), "profile part of the power coefficient"),
         "wall_time_s": (first, "wall-clock time in s, compilation included"),
         "compile_time_s": (max(first - again, 0.0), "part of the wall-clock time spent compiling, in s"),
     }
@@ -98,5 +98,5 @@ def _finite_state_alone(case: Case, settings: StudySettings) -> xr.Dataset:
         k: ((), v, {"units": "s" if k.endswith("_s") else "1", "long_name": t}) for k, (v, t) in numbers.items()
     }
     data = xr.Dataset(wake_file.place_of(case) | variables, attrs=wake_file.attributes(case, settings, "VPBFSM alone"))
-    data = data.assign_coords(radius=("radius", np.asarray(stations.r), {"units": "1", "long_name": "radius over R"}))
-    return data.assign(variables_of(result, stations, finite_state.model_of(case, settings).modes))
+    data = data.assign_coords(radius=("radius", np.asarray(found.r), {"units": "1", "long_name": "radius over R"}))
+    return data.assign(variables_of(result, found.stations, finite_state.model_of(case, settings).modes))

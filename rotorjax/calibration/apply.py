@@ -2,24 +2,22 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 import xarray as xr
 from jaxtyping import Array, Float
 
 from rotorjax.bench import finite_state
 from rotorjax.bench.azimuth import valley_side
-from rotorjax.bench.finite_state import Stations
 from rotorjax.bench.record import inflow_rms_difference, stations_at
 from rotorjax.bench.settings import StudySettings
 from rotorjax.bench.wake_file import case_of
 from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.errors import InputError
+from rotorjax.inflow.balance import Stations, blade_loads, self_consistent
 from rotorjax.potential import loading
 from rotorjax.potential.model import FiniteStateModel, disk_inflow, mean_inflow
-from rotorjax.rotor.blade_element import disk_loading, rotor_coefficients, section_loads
+from rotorjax.rotor.blade_element import rotor_coefficients
 
 
 def add_calibrated(data: xr.Dataset, settings: StudySettings, calibration: Calibration) -> xr.Dataset:
@@ -38,7 +36,7 @@ def add_calibrated(data: xr.Dataset, settings: StudySettings, calibration: Calib
     if "free_wake_inflow" not in data:
         tau, numbers = _self_consistent(tau, model, settings, stations, calibration)
     calibrated, state = calibration.apply(model, tau, settings.climb_ratio)
-    field = disk_inflow(state, *_places(stations), calibrated)
+    field = disk_inflow(state, *stations.xy, calibrated)
     numbers |= {"mean_inflow": float(mean_inflow(state, calibrated))}
     about = f"VPBFSM calibrated ({calibration.set})"
     found: dict[str, Any] = {f"calibrated_{k}": ((), v, {"units": "1"}) for k, v in numbers.items()}
@@ -86,10 +84,6 @@ def _stations(data: xr.Dataset, settings: StudySettings) -> Stations:
     return Stations(jnp.asarray(r), jnp.full(r.size, width), jnp.asarray(data["station_azimuth"].to_numpy()))
 
 
-def _places(stations: Stations) -> tuple[Array, Array]:
-    return stations.r * jnp.cos(stations.psi)[:, None], stations.r * jnp.sin(stations.psi)[:, None]
-
-
 def _self_consistent(
     start: Float[Array, " M"],
     model: FiniteStateModel,
@@ -100,22 +94,17 @@ def _self_consistent(
     """The pressure terms whose calibrated inflow gives them back, from those of the printed model."""
     rotor, operating, climb = settings.rotor, settings.operating, settings.climb_ratio
 
-    def blade(tau):
-        calibrated, state = calibration.apply(model, tau, climb)
-        down = disk_inflow(state, *_places(stations), calibrated) + climb
-        return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
+    def state_of(tau):
+        return calibration.apply(model, tau, climb)[1]
 
-    @eqx.filter_jit
-    def residual(tau, _):
-        loads = disk_loading(rotor, blade(tau))
-        return loading.from_distribution(loads, stations.r, stations.widths, stations.psi, model.modes) - tau
-
-    found = optx.root_find(residual, optx.Newton(rtol=1e-10, atol=1e-12), start, max_steps=50, throw=False)
-    if found.result != optx.RESULTS.successful or not float(loading.thrust_coefficient(found.value, model.modes)) > 0:
+    calibrated = calibration.apply(model, start, climb)[0]
+    tau, found = self_consistent(start, state_of, calibrated, rotor, operating, stations)
+    if not bool(found) or not float(loading.thrust_coefficient(tau, model.modes)) > 0:
         raise InputError(
             "Argument `calibration` must let the rotor find a loading that thrusts upward, but with "
             + ", ".join(f"{k} = {v:.4g}" for k, v in _values(calibration))
             + " no steady one was found"
         )
-    total = rotor_coefficients(rotor, blade(found.value), stations.r, stations.widths)
-    return found.value, {"CT": float(total.thrust), "CP_induced": float(total.induced)}
+    down = disk_inflow(state_of(tau), *stations.xy, calibrated) + climb
+    total = rotor_coefficients(rotor, blade_loads(down, rotor, operating, stations), stations.r, stations.widths)
+    return tau, {"CT": float(total.thrust), "CP_induced": float(total.induced)}

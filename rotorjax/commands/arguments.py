@@ -1,12 +1,15 @@
 """Arguments that several commands share."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rotorjax.bench.cases import Case
     from rotorjax.calibration.calibration_file import Calibration
+    from rotorjax.operating import OperatingPoint
+    from rotorjax.rotor.geometry import Rotor
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -39,6 +42,15 @@ def case_of(chosen: argparse.Namespace) -> "Case":
     case = Case(chosen.height, chosen.slope)
     _ = case.ground
     return case
+
+
+def introduce(rotor: "Rotor", operating: "OperatingPoint", moves: bool = False) -> None:
+    """The rotor's derived numbers at the top of a run, and on stderr what to know of blades that move."""
+    from rotorjax.rotor.derived import describe, notes
+
+    print(describe(rotor, operating))
+    for note in notes(rotor) if moves else ():
+        print(f"note: {note}", file=sys.stderr)
 
 
 def names_of(text: str) -> tuple[str, ...]:

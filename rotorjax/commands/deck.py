@@ -25,6 +25,7 @@ def run(chosen: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from rotorjax.bench import plotting
+    from rotorjax.commands.arguments import introduce
     from rotorjax.deck import output as deck_output
     from rotorjax.deck.case import read_case
     from rotorjax.deck.run import run_case
@@ -33,6 +34,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     case = read_case(chosen.case)
     out = make_folder(chosen.out)
+    introduce(case.rotor, case.operating, moves=not case.rigid)
     with tqdm(desc="deck", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
         bar.set_postfix_str("tables and march")
         data, figures = run_case(case)

@@ -5,7 +5,15 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotorjax.commands.arguments import add_calibration, add_harmonics, add_place, add_rotor, calibration_of, case_of
+from rotorjax.commands.arguments import (
+    add_calibration,
+    add_harmonics,
+    add_place,
+    add_rotor,
+    calibration_of,
+    case_of,
+    introduce,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +40,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--netcdf", type=Path, metavar="FILE", help="all arrays, labelled")
     add_harmonics(parser)
     add_calibration(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, free_wake=lambda chosen: chosen.model != "vpbfsm")
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -55,6 +63,7 @@ def run(chosen: argparse.Namespace) -> int:
     check_picture(chosen.plot)
     for path in (chosen.plot, chosen.json, chosen.netcdf):
         check_output(path)  # before the work, not after it
+    introduce(settings.rotor, settings.operating)
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
 
         def progress(stage: str, residual: float) -> None:

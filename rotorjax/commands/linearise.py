@@ -42,7 +42,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     from rotorjax.bench.settings import study_settings
     from rotorjax.bench.single import check_case
-    from rotorjax.commands.arguments import case_of, names_of
+    from rotorjax.commands.arguments import case_of, introduce, names_of
     from rotorjax.io.atomic import make_folder, write_json
     from rotorjax.linearisation import output
     from rotorjax.linearisation.run import Linearised, check, linearise_case, model_of
@@ -54,6 +54,7 @@ def run(chosen: argparse.Namespace) -> int:
     names = names_of(chosen.inputs), names_of(chosen.outputs)
     check(model, *names, chosen.order, chosen.harmonics)
     out = make_folder(chosen.out)  # before the work, not after it
+    introduce(settings.rotor, settings.operating)
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
 
         def progress(stage: str, residual: float) -> None:

@@ -24,6 +24,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Fly and write; the exit code."""
     from tqdm import tqdm
 
+    from rotorjax.commands.arguments import introduce
     from rotorjax.io.atomic import make_folder
     from rotorjax.simulation.case import read_case
     from rotorjax.simulation.files import write_all
@@ -31,6 +32,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     case = read_case(chosen.case)
     out = make_folder(chosen.out)
+    introduce(case.request.rotor, case.request.operating, moves=True)
     with tqdm(desc="simulate", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
         found = fly(case, bar.set_postfix_str)
         bar.set_postfix_str("files")
@@ -45,6 +47,11 @@ def run(chosen: argparse.Namespace) -> int:
     if "wake_change_last" in told:
         last, most = told["wake_change_last"], told["wake_change_max"]
         print(f"wake nodes moved over the last revolution by {last:.2e} R (rms), over any by up to {most:.2e} R")
+    if told["vortex_ring_s"]:
+        print(
+            f"note: {told['vortex_ring_s']:.2f} s in the vortex ring state, where no inflow model holds",
+            file=sys.stderr,
+        )
     if not found.finished:
         print(f"the march ended early: {found.why}")
     return 0 if found.finished else 1

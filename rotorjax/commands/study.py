@@ -4,7 +4,7 @@ import argparse
 import time
 from pathlib import Path
 
-from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor, calibration_of
+from rotorjax.commands.arguments import add_calibration, add_harmonics, add_rotor, calibration_of, introduce
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -31,6 +31,8 @@ def run(chosen: argparse.Namespace) -> int:
     """Run the study; the exit code."""
     from rotorjax.bench.cases import HEIGHTS, QUICK_HEIGHTS, QUICK_SLOPES_DEG, SLOPES_DEG, study_cases
     from rotorjax.bench.settings import study_settings
+    from rotorjax.bench.single import check_case
+    from rotorjax.io.atomic import make_folder
     from rotorjax.study.output import write_all
     from rotorjax.study.run import solve_cases
 
@@ -48,6 +50,10 @@ def run(chosen: argparse.Namespace) -> int:
         flapping=not (chosen.rigid or chosen.quick),
         **changes,
     )
+    for case in cases:
+        check_case(case, settings, "both")
+    make_folder(chosen.out)  # before the work, not after it
+    introduce(settings.rotor, settings.operating, moves=settings.flapping)
     result = solve_cases(cases, settings, chosen.out)
     # a PDF's fonts take longer than its picture, and a first look needs none
     formats = ("png",) if chosen.quick else ("png", "pdf")

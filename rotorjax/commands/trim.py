@@ -29,12 +29,13 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     add("--json", type=Path, metavar="FILE", help="all numbers; of a curve a list of them under `points`")
     add("--plot", type=Path, metavar="FILE", help="picture of a curve: .png, .pdf or .svg")
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, free_wake=lambda chosen: chosen.inflow == "freewake")
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
     from rotorjax.bench.single_output import check_picture
+    from rotorjax.commands.arguments import introduce
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
     from rotorjax.trim.curve import curve, requests
@@ -58,6 +59,7 @@ def run(chosen: argparse.Namespace) -> int:
     for path in (chosen.json, chosen.plot):
         check_output(path)
     free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
+    introduce(base.rotor, base.operating, moves=True)
     results = curve([*wanted, *free])
     found = [numbers(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))

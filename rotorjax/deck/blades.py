@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
+from rotorjax.inflow import balance
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.loading import from_distribution
@@ -20,17 +21,8 @@ from rotorjax.rotor.blade_element import disk_loading, section_loads
 from rotorjax.rotor.geometry import Rotor
 
 
-class Stations(eqx.Module):
-    """Where loads are taken. r, widths (R,): Gauss nodes and weights, over R. psi (K,): equal steps of a turn (rad)."""
-
-    r: Float[Array, " R"]
-    widths: Float[Array, " R"]
-    psi: Float[Array, " K"]
-
-    @property
-    def xy(self) -> tuple[Float[Array, "K R"], Float[Array, "K R"]]:
-        """Hub-frame stations."""
-        return self.r * jnp.cos(self.psi)[:, None], self.r * jnp.sin(self.psi)[:, None]
+class Stations(balance.Stations):
+    """Where loads are taken: Gauss nodes and weights along the blades, with what the march needs of them."""
 
     def functions(self, modes: ModeTable) -> Float[Array, "M KR"]:
         """Return the inflow of unit states at the stations."""

@@ -39,9 +39,11 @@ class FiniteStateInflow(InflowModel):
     model: FiniteStateModel
 
     def start(self, thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, " M"]:
-        """One pressure mode that carries the thrust, with momentum theory's mean inflow."""
-        first = self.model.modes.index(0, 1)
-        return jnp.zeros(len(self.model.modes)).at[first].set(jnp.sqrt(3.0) / 2 * hover_inflow(thrust, inputs))
+        """One pressure mode that carries the thrust, with momentum theory's mean inflow, less the ground's upflow."""
+        first, count = self.model.modes.index(0, 1), len(self.model.modes)
+        alone = jnp.zeros(count).at[first].set(jnp.sqrt(3.0) / 2 * hover_inflow(thrust, inputs))
+        over, _ = self._over(alone, inputs)
+        return alone / jnp.sqrt(1 - jnp.sqrt(3.0) / 2 * answer_means(over)[first])
 
     def velocity(
         self, state: Float[Array, " M"], points: Float[Array, "*n 3"], inputs: RotorInputs
@@ -91,13 +93,13 @@ class FiniteStateInflow(InflowModel):
         over = eqx.tree_at(lambda m: m.ground.height, model, inputs.height)
         if inputs.turn is None:
             return over, None
-        normal = TurnedPlane(inputs.height, self.model.ground.slope, inputs.turn).normal
+        normal = TurnedPlane(inputs.height, model.ground.slope, inputs.turn).normal
         # straight aft or ahead x will do, with either sign of the slope: smooth where the ground is level
         aside = normal[1] != 0
         across = jnp.sqrt(jnp.where(aside, normal[0] ** 2 + normal[1] ** 2, 1.0))
         uphill = jnp.where(aside, -normal[:2] / across, jnp.array([1.0, 0.0]))
         slope = jnp.arctan2(-normal[:2] @ uphill, normal[2])
-        distance = inputs.height * jnp.cos(self.model.ground.slope)
+        distance = inputs.height * jnp.cos(model.ground.slope)
         ground = Plane(distance / normal[2], slope)
         return eqx.tree_at(lambda m: m.ground, over, ground), uphill
 
@@ -134,7 +136,7 @@ def finite_state(
 
     Raises InputError where a count is not allowed.
     """
-    sources = (harmonics, 5) if ground is not None else (0, 5)
+    settings = {"quadrature": DiskQuadrature(16, 16), **settings}
     return FiniteStateInflow(
-        finite_state_model(ground, harmonics, radial_terms, *sources, quadrature=DiskQuadrature(16, 16), **settings)
+        finite_state_model(ground, harmonics, radial_terms, harmonics if ground is not None else 0, 5, **settings)
     )

@@ -10,8 +10,9 @@ from rotorjax.bench.markdown import table
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.marching import STEPS
-from rotorjax.linearisation.reduce import HIGHEST
+from rotorjax.linearisation.reduce import HIGHEST, Small
 from rotorjax.linearisation.run import TOL, Linearised
+from rotorjax.linearisation.waves import Spectrum
 from rotorjax.ode.export import save_mat, save_netcdf
 from rotorjax.wake.solution import Solution
 
@@ -92,29 +93,32 @@ def summary(found: Linearised) -> dict[str, Any]:
         "pairing": None,
     }
     if found.spectrum is not None:
-        content["floquet_multipliers"] = [
-            {
-                "wave_number": mode.wave,
-                "real": mode.multiplier.real,
-                "imaginary": mode.multiplier.imag,
-                "magnitude": abs(mode.multiplier),
-                "growth": mode.exponent.real,
-                "frequency": mode.exponent.imag,
-                "growth_over_pairing": mode.exponent.real / found.spectrum.pairing.rate[1],
-                "rounding_error": mode.error,
-            }
-            for mode in found.spectrum.modes
-        ]
-        names = ("smallest", "median", "largest")
-        pairing = found.spectrum.pairing
-        content["pairing"] = {
-            field: dict(zip(names, getattr(pairing, field), strict=True))
-            for field in ("circulation", "spacing", "rate")
+        content |= _spectrum(found.spectrum)
+    times = {"compile_time_s": found.compile_time_s, "wall_time_s": sum(found.seconds.values())}
+    return content | {"stages_s": found.seconds} | times
+
+
+def _spectrum(found: Spectrum) -> dict[str, Any]:
+    """Growing and decaying waves of an axisymmetric wake."""
+    names = ("smallest", "median", "largest")
+    multipliers = [
+        {
+            "wave_number": mode.wave,
+            "real": mode.multiplier.real,
+            "imaginary": mode.multiplier.imag,
+            "magnitude": abs(mode.multiplier),
+            "growth": mode.exponent.real,
+            "frequency": mode.exponent.imag,
+            "growth_over_pairing": mode.exponent.real / found.pairing.rate[1],
+            "rounding_error": mode.error,
         }
-    content["stages_s"] = found.seconds
-    content["compile_time_s"] = found.compile_time_s
-    content["wall_time_s"] = sum(found.seconds.values())
-    return content
+        for mode in found.modes
+    ]
+    pairing = {
+        field: dict(zip(names, getattr(found.pairing, field), strict=True))
+        for field in ("circulation", "spacing", "rate")
+    }
+    return {"floquet_multipliers": multipliers, "pairing": pairing}
 
 
 def report(found: Linearised, title: str, content: dict[str, Any]) -> str:
@@ -155,8 +159,7 @@ def _models(found: Linearised, content: dict[str, Any]) -> str:
         else "Constant in the blades' frames; axisymmetric disturbances are all that these inputs and outputs meet."
     )
     small_text = (
-        f"Reduced model: {small.frequency.model.order} states, balanced with all unstable modes kept; error bound over "
-        f"all frequencies {small.frequency.reduced.bound:.2g}. It is right in frequency and in time, so that "
+        f"Reduced model: {small.frequency.model.order} states, {_kept(small.frequency)}. It is right in frequency and in time, so that "
         "reduced_frequency and reduced_time (.nc, .mat) hold the same."
         if small.time is small.frequency
         else f"{small.frequency.model.order} states cannot hold {small.unstable} unstable modes and a response beside "
@@ -168,6 +171,13 @@ def _models(found: Linearised, content: dict[str, Any]) -> str:
         f"## Models\n\nFull model: {content['full_order']} states, {small.unstable} unstable modes. {kind}\n\n"
         f"{small_text}"
     )
+
+
+def _kept(small: Small) -> str:
+    """How a model was reduced, with its error bound over all frequencies where the method has one."""
+    bound = small.reduced.bound
+    told = "no error bound, errors as measured" if bound is None else f"error bound over all frequencies {bound:.2g}"
+    return f"{small.method}, all unstable modes kept; {told}"
 
 
 def _responses(found: Linearised, content: dict[str, Any]) -> str:

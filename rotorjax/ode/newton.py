@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from rotorjax.ode.linear import Dense
-from rotorjax.ode.outcome import Log, Measure, Outcome, flatten, relative_rms, traceable
+from rotorjax.ode.outcome import Log, Measure, Outcome, advice, attainable, flatten, relative_rms, traceable
 
 
 class LinearSolve(Protocol):
@@ -54,6 +54,8 @@ def newton(
     `Krylov(...)`. measure(f, x): size of the residual, relative rms by default; `tol` is compared with it. memory: that
     of an earlier Outcome, so that a continuation can go on with a factorised Jacobian.
 
+    In single precision `tol` is at least 1e-5.
+
     A step is halved until the residual falls (Armijo, 1e-4); where a reused Jacobian finds no descent it is made anew
     before giving up. Numbers in `args` may change without compiling again, as long as `residual` is the same function.
     A run that diverges, stalls or is interrupted returns the best iterate with `converged` False and says why.
@@ -69,7 +71,7 @@ def newton(
         return np.asarray(value), place
 
     x = np.asarray(flat)
-    with Log("newton", tol, max_iterations, progress) as log:
+    with Log("newton", attainable(tol, flat.dtype), max_iterations, progress) as log:
         f, place = evaluate(x)
         size = measure(f, x)
         done = log.note(x, size)
@@ -84,7 +86,7 @@ def newton(
                 if not again:
                     log.why = (
                         f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
-                        "lowers the residual (a fold, a kink or the limit of precision)"
+                        f"lowers the residual (a fold, a kink or the limit of precision{advice(flat.dtype)})"
                     )
                     break
                 continue

@@ -48,6 +48,20 @@ def relative_rms(f: np.ndarray, x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(f)))) / (scale if scale > 0 else 1.0)
 
 
+SINGLE = 1e-5  # residual that single precision reaches in these models: its rounding of 6e-8, grown by their sums
+
+
+def attainable(tol: float, dtype: Any) -> float:
+    """A tolerance, or what single precision can meet of it."""
+    return tol if jnp.finfo(dtype).bits == 64 else max(tol, SINGLE)
+
+
+def advice(dtype: Any) -> str:
+    """What to do about a residual that stays too large, where single precision may be to blame."""
+    single = jnp.finfo(dtype).bits < 64
+    return ' in single precision; jax.config.update("jax_enable_x64", True) lifts it' if single else ""
+
+
 def flatten(x: PyTree, name: str = "x0") -> tuple[Float[Array, " n"], Callable[[Array], PyTree]]:
     """Flat vector of a state and the way back, after checking that it is made of finite floating-point numbers.
 

@@ -127,7 +127,7 @@ def response(
     into, onto = flow_matrix(model, ground, transport), disk_projection(model, ground)
     row, column = strength_factors(model)
     copies = 1 if transport is None else transport.nodes + 1
-    factor = jnp.asarray(row)[:, None] * jnp.asarray(np.tile(column, copies))
+    factor = row[:, None] * jnp.tile(column, copies)
 
     def answer(region: Region | None) -> Float[Array, "L C"]:
         states = closing(eqx.tree_at(lambda m: m.region, model, region, is_leaf=lambda r: r is None), ground) @ into

@@ -229,12 +229,12 @@ def wake_over(model: FiniteStateModel, ground: Plane | None) -> Contraction | No
     return model.wake if model.wake is None or ground is None else model.wake.over(ground.height)
 
 
-def source_radius(model: FiniteStateModel, ground: Plane) -> Float[Array, ""] | float:
+def source_radius(model: FiniteStateModel, ground: Plane) -> Float[Array, ""]:
     """Return the radius of the ground disk over R: the one that was given, or that of the wake there."""
     if model.ground_radius is not None:
         return model.ground_radius
     wake = wake_over(model, ground)
-    return 1.0 if wake is None else wake.radius
+    return jnp.asarray(1.0) if wake is None else wake.radius
 
 
 def footprint(model: FiniteStateModel, ground: Plane) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
@@ -260,11 +260,12 @@ def ground_matrix(model: FiniteStateModel, ground: Plane) -> Float[Array, "G M"]
     return row[:, None] * (closing(model, ground) @ rotor_into_ground(model, ground).T) * column
 
 
-def strength_factors(model: FiniteStateModel) -> tuple[np.ndarray, np.ndarray]:
+def strength_factors(model: FiniteStateModel) -> tuple[Float[Array, " G"], Float[Array, " M"]]:
     """Return the factors by row and by column, (G,) and (M,), on G that closes the plane; ones but for "printed"."""
     if model.strengths == "printed":
-        return printed_strengths(model.modes, model.sources)
-    return np.ones(len(model.sources)), np.ones(len(model.modes))
+        row, column = printed_strengths(model.modes, model.sources)
+        return jnp.asarray(row), jnp.asarray(column)
+    return jnp.ones(len(model.sources)), jnp.ones(len(model.modes))
 
 
 def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "G ..."]:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.operating import OperatingPoint
@@ -93,7 +94,7 @@ def section_loads(
         cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
     else:
         # one look-up for the sections' own angles and, at zero angle, for the slope where the flow is attached
-        angles = jnp.stack([jnp.zeros_like(entry), entry])
+        angles = entry * np.array([0.0, 1.0], entry.dtype).reshape(2, *(1,) * entry.ndim)
         look_up = partial(_coefficients, rotor, r, mach=mach, simple_sweep=simple_sweep)
         (cl, cd), (slope, _) = jax.jvp(look_up, (angles,), (jnp.ones_like(angles),))
         cl, cd = cl[1] + slope[0] * (alpha - entry), cd[1]

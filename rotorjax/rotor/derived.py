@@ -66,6 +66,14 @@ def describe(rotor: Rotor, operating: OperatingPoint) -> str:
     return ", ".join(parts) + f"; section {rotor.airfoil.name or 'unnamed'}"
 
 
+def notes(rotor: Rotor) -> list[str]:
+    """What a user should know about a rotor before trusting how its blades move."""
+    hinge = rotor.hinge
+    if hinge is None or hinge.damper_rate is not None:
+        return []
+    return [f"{rotor.name} has a lag hinge without a damper: its lag hardly decays; see lag_damper_file in [hinge]"]
+
+
 def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
     """Raise InputError where a rotor's derived numbers are beyond sense, by a wrong unit, or beyond its tables."""
     if not known(rotor, operating):

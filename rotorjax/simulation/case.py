@@ -132,17 +132,24 @@ def _build(data: Tables, folder: Path) -> SimulationCase:
     if "rotor_speed" not in history:
         columns[:, -1] = 100.0
     case = SimulationCase(_request(data["flight"], folder), duration, steps, t, columns, dict(data.get("wake", {})))
-    _check_wake(case)
+    _check_model(case)
     return case
 
 
-def _check_wake(case: SimulationCase) -> None:
+def _check_model(case: SimulationCase) -> None:
     """What the free wake cannot do, and settings of it that nothing would read."""
     request = case.request
+    turned = [n for n in ("v", "p_deg", "r_deg") if np.any(case.columns[:, COLUMNS.index(n)])]
+    if request.rotor.side < 0 and turned:
+        raise InputError(
+            f"[history] {turned[0]} must be 0 for a clockwise rotor, whose flight is computed as its mirror image: fly "
+            "the counter-clockwise rotor with v, p_deg and r_deg of the opposite sign"
+        )
     if request.inflow != FREE_WAKE:
         if case.wake:
             raise InputError(f'[wake] must come with inflow = "{FREE_WAKE}" in [flight], but it is "{request.inflow}"')
         return
+    wake_settings(**case.wake)
     if request.height is not None and request.slope_deg and request.advance:
         raise InputError(
             f"[flight] advance_ratio must be 0 over sloping ground in the free wake, but is {request.advance:g}: its "

@@ -14,6 +14,7 @@ from rotorjax.bench import plotting
 from rotorjax.bench.film import write_film
 from rotorjax.coupled import inflow_velocity, stations
 from rotorjax.coupled_wake import CoupledWake
+from rotorjax.inflow.momentum import in_vortex_ring
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import ATTITUDE
 from rotorjax.simulation.ground_view import ground_arrays, ground_line
@@ -48,16 +49,8 @@ def dataset(found: Simulated) -> xr.Dataset:
     )
     for name in ("CT", "CQ"):
         data[f"trim_{name}"] = ((), getattr(found.start, name), {"long_name": "mean over a revolution of the trim"})
+    data = data.assign(_inputs(found, tip))
     data["azimuth"] = ("time", np.asarray(x.psi), {"units": "rad"})
-    for name in ("theta_0", "theta_1c", "theta_1s"):
-        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
-    for name in ("u", "v", "w"):
-        data[name] = ("time", np.asarray(getattr(u, name)) * tip, {"units": "m/s"})
-    for name in ("p", "q", "r"):
-        data[name] = ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"})
-    data["rotor_speed"] = ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})
-    for name in ATTITUDE:
-        data[name] = ("time", np.rad2deg(getattr(u, name)), degrees)
     if u.height is not None:
         data = data.assign(ground_arrays(u, found.case.request.slope_deg))
     data["flap"] = (("time", "coordinate"), np.rad2deg(x.rotor.flap), degrees)
@@ -72,6 +65,16 @@ def dataset(found: Simulated) -> xr.Dataset:
     at = np.arange(0, count, max(1, -(-count // _MOST_FRAMES)))
     data = data.assign(_frames(found, at))
     return data.assign(wake_arrays(found, at)) if isinstance(p, CoupledWake) else data
+
+
+def _inputs(found: Simulated, tip: float) -> dict[str, tuple]:
+    """Controls, hub motion and attitude; tip: ΩR in m/s."""
+    u, omega = found.flown.u, float(found.start.p.operating.omega)
+    angles = ("theta_0", "theta_1c", "theta_1s", *ATTITUDE)
+    told = {name: ("time", np.rad2deg(getattr(u, name)), {"units": "deg"}) for name in angles}
+    told |= {name: ("time", np.asarray(getattr(u, name)) * tip, {"units": "m/s"}) for name in ("u", "v", "w")}
+    told |= {name: ("time", np.rad2deg(getattr(u, name)) * omega, {"units": "deg/s"}) for name in ("p", "q", "r")}
+    return told | {"rotor_speed": ("time", np.asarray(u.omega), {"long_name": "over the nominal one"})}
 
 
 def _frames(found: Simulated, at: np.ndarray) -> dict[str, xr.DataArray]:
@@ -116,12 +119,20 @@ def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
         "march_s": found.march_s,
         "march_s_per_revolution": found.march_s / turns,
         "real_time_factor": flown_s / found.march_s,
+        "vortex_ring_s": vortex_ring(found, data["time"].values),
         **_of_the_wake(data),
         "histories": {
             n: {"first": v[0], "last": v[-1], "min": float(np.min(v)), "max": float(np.max(v))}
             for n, v in series.items()
         },
     }
+
+
+def vortex_ring(found: Simulated, time: np.ndarray) -> float:
+    """Seconds of a flight in the vortex ring state, by C_T and the hub's velocities along and across the shaft."""
+    u, thrust = found.flown.u, np.asarray(found.flown.y.CT)
+    within = in_vortex_ring(thrust, -np.asarray(u.w), np.hypot(np.asarray(u.u), np.asarray(u.v)))
+    return float(np.sum(np.diff(time) * within[1:]))
 
 
 def _of_the_wake(data: xr.Dataset) -> dict[str, Any]:

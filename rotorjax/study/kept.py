@@ -44,8 +44,8 @@ def _kept(path: Path, case: Case, settings: StudySettings, say: Callable[[str], 
     try:
         data = netcdf.read(path, sealed=True)
         held = case_of(data)
-    except (InputError, KeyError) as error:
-        return _set_aside(path, f"damaged ({error})", say)
+    except (InputError, KeyError):
+        return _set_aside(path, "damaged", say)
     _check_study(data, settings, path)
     return data if held == case else _set_aside(path, f"of another case ({held.label})", say)
 

@@ -9,7 +9,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax.checks import check_number, closest
+from rotorjax.checks import check_number, closest, shown
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
@@ -89,10 +89,10 @@ def request(rotor: str | Path, thrust: float, *arguments: Any, **more: Any) -> R
 
 def check(request: Request) -> None:
     """Raise InputError where something of a request is not allowed, before any work."""
-    if request.inflow not in INFLOWS:
+    if not isinstance(request.inflow, str) or request.inflow not in INFLOWS:
         raise InputError(
-            f"Argument `inflow` must be one of {', '.join(INFLOWS)}, but is '{request.inflow}': "
-            f"{closest(request.inflow, INFLOWS)}"
+            f"Argument `inflow` must be one of {', '.join(INFLOWS)}, but is {shown(request.inflow)}: "
+            f"{closest(str(request.inflow), INFLOWS)}"
         )
     if request.slope_deg and request.height is None:
         raise InputError(
@@ -181,7 +181,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
         "CP_damper": flown.CP_damper,
-        "hub_roll_moment": -float(flown.moment[0]),
+        "hub_roll_moment": -request.rotor.side * float(flown.moment[0]),
         "hub_pitch_moment": float(flown.moment[1]),
         "figure_of_merit": figure_of_merit(flown.CT, flown.CQ, request),
         "wall_time_s": result.wall_time_s,

@@ -1,9 +1,8 @@
 """The finite-state model, default and as printed: against measured ground effect, and against the free wake."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 from matplotlib.figure import Figure
 
 from rotorjax.bench.cases import Case
@@ -111,7 +110,7 @@ def _wake_rows(found: dict[Point, FiniteStateResult], wakes: Wakes, reference: f
     return rows
 
 
-def _rms(ours: Sequence, wake: Solution, reference: float) -> float:
+def _rms(ours: Array, wake: Solution, reference: float) -> float:
     return rms_difference(np.asarray(ours) / reference, wake.inflow / reference, wake.r, wake.widths)
 
 

@@ -11,6 +11,8 @@ directions is taken, which is right for a filament that runs straight on. A segm
 axis: the velocity there is zero by convention and has no meaningful derivative.
 """
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -109,8 +111,9 @@ def lattice_velocity(
     )
 
 
+@partial(jax.jit, static_argnames=("settings", "blades"))
 def _velocity(settings, points, start, end, strength, core, plane: Plane | None, blades: int):
-    """Sum over the segments, the other blades and the mirror image.
+    """Sum over the segments, the other blades and the mirror image: one program, also where nothing else is compiled.
 
     A copy's velocity is the segments' own at the point turned (or reflected) back, turned (or reflected) with the copy.
     """
@@ -118,7 +121,7 @@ def _velocity(settings, points, start, end, strength, core, plane: Plane | None,
         return jnp.zeros_like(points)
     soft = jnp.sum((end - start) ** 2, axis=1) * core**2
     segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
-    angles = (2 * np.pi / blades * np.arange(blades, dtype=points.dtype))[:, None]
+    angles = jnp.asarray(2 * np.pi / blades * np.arange(blades)[:, None], points.dtype)
     sides = points[None] if plane is None else jnp.stack([points, plane.reflect_points(points)])
     # one sum for all copies, (sides, blades, N, 3)
     copies = jnp.broadcast_to(sides[:, None], (len(sides), blades, *points.shape))

@@ -65,7 +65,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
         along = model.flight.wind * np.array([1.0, 1.0, 0.0])
         drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
     # all repeats at once, (F, repeats, N, 3)
-    after = np.array(repeats(model).after)[:, None]
+    after = jnp.asarray(repeats(model).after)[:, None]
     if model.ground is None:
         pitch = jnp.mean(last[..., 2] - before[..., 2], axis=1)
         down = pitch[:, None] * np.array([0.0, 0.0, 1.0]) + drift

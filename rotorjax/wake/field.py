@@ -65,7 +65,10 @@ def velocity_now(
 ) -> Float[Array, "N 3"]:
     """Induced velocity over ΩR at hub-frame points over R, at the one instant at which slice 0 stands at psi."""
     segments, angles = wake_segments(model, state, psi), azimuths(state, psi)
-    places = jnp.broadcast_to(points, (-(-slices(state) // model.rotor.blades), *points.shape))
+    if slices(state) == 1:
+        turned = rotate_about_shaft(points, -angles)
+        return rotate_about_shaft(_at_instants(model, segments, turned[None], angles)[0], angles)
+    places = jnp.broadcast_to(points, (slices(state) // model.rotor.blades, *points.shape))
     return _at_instants(model, segments, places, angles)[0]
 
 
@@ -74,8 +77,8 @@ def _at_instants(
 ) -> Float[Array, "I N 3"]:
     """Velocity at points of the hub frame, N for each instant, from all blades' wakes and their images in the ground.
 
-    The ground is fixed in that frame. K = 1: every blade's wake is the same. Else slices i, i + I, i + 2I … are the
-    blades' wakes at instant i.
+    The ground is fixed in that frame. Slices i, i + I, i + 2I … are the blades' wakes at instant i. K = 1: every
+    blade's wake is the same, and points are seen from the slice's own blade, as level ground looks from all of them.
     """
     turned = segments._replace(start=_turned(segments.start, angles), end=_turned(segments.end, angles))
     blades = model.rotor.blades if len(angles) == 1 else 1
@@ -91,7 +94,7 @@ def _at_instants(
 
 
 def _turned(vectors: Float[Array, "K n 3"], angles: Float[Array, " K"]) -> Float[Array, "K n 3"]:
-    """Vectors of each slice turned by its angle; an axisymmetric wake (K = 1) is the same at all azimuths."""
+    """Vectors of each slice turned by its angle; the frame of a lone slice (K = 1) is as good as the hub's."""
     return vectors if len(angles) == 1 else rotate_about_shaft(vectors, angles[:, None])
 
 

@@ -172,7 +172,7 @@ def free_wake(
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:
     """Points on the blade's axis at r, in the blade's frame."""
-    return jnp.stack([r, jnp.zeros_like(r), jnp.zeros_like(r)], axis=-1)
+    return r[..., None] * np.array([1.0, 0.0, 0.0], r.dtype)
 
 
 def on_blade(model: FreeWake, r: Float[Array, " N"]) -> Float[Array, "N 3"]:

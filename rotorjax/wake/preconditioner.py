@@ -43,7 +43,7 @@ def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int, found: Evaluatio
     # the derivative is real, so that of −q is the conjugate of that of q
     waves = [p % blades for p in range(slices // 2 + 1)]
     half = {
-        q: velocity_response(model, found.state, np.asarray(2 * np.pi * q / blades))
+        q: velocity_response(model, found.state, jnp.asarray(2 * np.pi * q / blades))
         for q in sorted({min(p, blades - p) for p in waves})
     }
     return _inverse(model, x, found, [half[min(p, blades - p)] for p in waves], [p in half for p in waves], slices)

@@ -128,7 +128,8 @@ def over_distant_ground(model: FreeWake) -> FreeWake:
     """The model over level ground so far down that the wake out of ground effect is a good guess."""
     ground = model.ground
     assert ground is not None
-    level = Plane(np.maximum(3.0, 1.5 * np.asarray(ground.height)), np.zeros_like(ground.slope))
+    height = np.maximum(3.0, 1.5 * np.asarray(ground.height))
+    level = Plane(jnp.asarray(height), jnp.asarray(np.zeros_like(ground.slope)))
     return on_host(eqx.tree_at(lambda m: m.ground, model, level))
 
 

@@ -25,7 +25,7 @@ def _prescribed(model: FreeWake, inflow: Float[Array, ""]) -> Unknowns:
     step = settings.age_step
     near_age = step * np.arange(1, settings.near_ages + 1)
     narrowing = 0.8 + 0.2 * np.exp(-0.3 * near_age)
-    x, y = (jnp.outer(model.edges, narrowing * part) for part in (np.cos(near_age), -np.sin(near_age)))
+    x, y = (model.edges[:, None] * (narrowing * part) for part in (np.cos(near_age), -np.sin(near_age)))
     near = jnp.stack([x, y, jnp.broadcast_to(-0.5 * inflow * near_age, x.shape)], axis=-1)
     age = settings.filament_ages[1:]
     passage = 2 * np.pi / model.rotor.blades
@@ -36,7 +36,7 @@ def _prescribed(model: FreeWake, inflow: Float[Array, ""]) -> Unknowns:
         radius = radius * jnp.exp(0.5 * jnp.clip(inflow / height * age - 1, 0, None))
         depth = height * (1 - jnp.exp(-inflow / height * age))
     spans = np.minimum([1.0, *settings.inboard], [1.0, *(0.85 for _ in settings.inboard)])
-    x, y = (jnp.outer(spans, radius * part) for part in (np.cos(age), -np.sin(age)))
+    x, y = (spans[:, None] * (radius * part) for part in (np.cos(age), -np.sin(age)))
     far = jnp.stack([x, y, jnp.broadcast_to(-depth, x.shape)], axis=-1)
     gamma = 0.36 * model.chords * jnp.sqrt(jnp.clip(1 - ((model.stations - 0.65) / 0.37) ** 2, 0, 1))
     return Unknowns(near[None], far[None], gamma[None])

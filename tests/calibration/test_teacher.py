@@ -101,7 +101,7 @@ def test_a_file_that_is_no_study_is_refused(study, tmp_path):
     netcdf.write(tmp_path / "other.nc", study.drop_vars("vpbfsm_tau"))
     with pytest.raises(InputError, match=r"must be the cases\.nc of a study, but lacks vpbfsm_tau"):
         teacher.find_cases(tmp_path / "other.nc")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="must be readable"):
         teacher.find_cases(tmp_path / "missing.nc")
 
 

@@ -64,7 +64,7 @@ BAD = {
     "calibrate hayden --out {tmp}/a --loading square": "invalid choice: 'square'",
     "calibrate hayden --out {tmp}/file/a": "must be writable",
     "calibrate freewake --out {tmp}/a": "--cases",
-    "calibrate freewake --out {tmp}/a --cases {tmp}/none.nc": "cannot be read",
+    "calibrate freewake --out {tmp}/a --cases {tmp}/none.nc": "must be readable",
     "calibrate freewake --out {tmp}/a --cases {tmp} --held h9": "but holds 'h9'",
     "calibrate freewake --out {tmp}/a --cases {tmp} --parameters core": "but holds 'core'",
     "calibrate hayden --out {tmp}/a --cases {tmp} --heights 1.2": "h1.2 is not",

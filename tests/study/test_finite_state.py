@@ -11,6 +11,7 @@ from rotorjax.bench.settings import study_settings
 from rotorjax.errors import InputError
 from rotorjax.potential import model as potential
 from rotorjax.potential import rigid_cylinder
+from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.rotor.blade_element import disk_loading, section_loads
 
 EDGES = np.linspace(0.1, 1.0, 41)
@@ -41,15 +42,21 @@ def test_fields_are_the_models(settings, sloped):
     np.testing.assert_allclose(sloped.mean_inflow, potential.mean_inflow(state, model), rtol=1e-10)
     left = potential.ground_normal_velocity_rms(state, model)
     np.testing.assert_allclose(sloped.ground_normal_velocity_rms, left, rtol=1e-9)
-    exact = rigid_cylinder.inflow(state, STATIONS.r, STATIONS.psi, model, finite_state.PATCH)
+    printed = finite_state.model_of(Case(1.0, 15.0), settings, printed=True)
+    state = potential.steady_state(printed, sloped.tau)
+    np.testing.assert_allclose(
+        sloped.printed_inflow, potential.inflow(state, STATIONS.r, STATIONS.psi, printed), atol=1e-12
+    )
+    np.testing.assert_allclose(sloped.printed_mean_inflow, potential.mean_inflow(state, printed), rtol=1e-10)
+    exact = rigid_cylinder.inflow(state, STATIONS.r, STATIONS.psi, printed, finite_state.PATCH)
     np.testing.assert_allclose(sloped.exact_image_inflow, exact, atol=1e-12)
 
 
 def test_source_patch_is_fine_enough_on_the_steepest_slope(settings):
     result = finite_state.from_loads(Case(1.0, 40.0), settings, LOADS, STATIONS)
-    model = finite_state.model_of(Case(1.0, 40.0), settings)
-    fine = rigid_cylinder.PATCH.__class__(160, 256)
-    exact = rigid_cylinder.inflow(result.states, STATIONS.r, STATIONS.psi, model, fine)
+    model = finite_state.model_of(Case(1.0, 40.0), settings, printed=True)
+    state = potential.steady_state(model, result.tau)
+    exact = rigid_cylinder.inflow(state, STATIONS.r, STATIONS.psi, model, DiskQuadrature(160, 256))
     np.testing.assert_allclose(result.exact_image_inflow, exact, atol=2e-5 * float(result.mean_inflow))
 
 
@@ -76,13 +83,14 @@ def test_one_pressure_term_climbs_as_momentum_theory(climb):
 
 
 def test_alone_carries_the_loads_of_its_own_inflow(settings):
-    result, total, stations = finite_state.alone(Case(1.0, 15.0), settings)
+    result, own = finite_state.alone(Case(1.0, 15.0), settings)
+    stations = own.stations
     through = jnp.broadcast_to(stations.r, result.inflow.shape), result.inflow
     sections = section_loads(settings.rotor, settings.operating, stations.r, *through)
     loads = np.asarray(disk_loading(settings.rotor, sections))
     back = finite_state.from_loads(Case(1.0, 15.0), settings, loads, stations)
     np.testing.assert_allclose(back.tau, result.tau, atol=1e-10)
-    assert 0.004 < float(total.thrust) < 0.012
+    assert 0.004 < float(own.CT) < 0.012
 
 
 @pytest.mark.parametrize(("loads", "words"), [(LOADS * np.nan, "must be finite"), (-LOADS, "positive thrust")])
@@ -92,5 +100,5 @@ def test_loads_that_cannot_drive_it(settings, loads, words):
 
 
 def test_no_thrust_no_answer():
-    with pytest.raises(InputError, match="thrusts upward"):
+    with pytest.raises(InputError, match="thrusts upward, but at -15 deg"):
         finite_state.alone(Case(), study_settings(collective_deg=-15.0))

@@ -7,14 +7,14 @@ import pytest
 from scipy.special import ellipe, ellipk, elliprf, elliprj, iv, ivp, kv, kvp
 
 from rotorjax.frames import rotate_about_shaft
+from rotorjax.wake import field, segments
 from rotorjax.wake.biot_savart import filament_velocity, segment_velocity
-from rotorjax.wake.field import self_induction
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.roll_up import Release
-from rotorjax.wake.segments import far_filaments
 from rotorjax.wake.settings import wake_settings
 
 THIN = 1e-6
+far_filaments, self_induction = eqx.filter_jit(segments.far_filaments), eqx.filter_jit(field.self_induction)
 
 
 def kawada_hardin(r, pitch, blades=1):

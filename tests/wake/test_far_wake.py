@@ -9,15 +9,16 @@ from scipy.integrate import solve_ivp
 
 from rotorjax.ground import Plane, plane
 from rotorjax.rotor.catalogue import load
+from rotorjax.wake import far_wake, segments
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.far_wake import REACH, closure, faded, repeats, segment_ages, turns_each
+from rotorjax.wake.far_wake import REACH, repeats, segment_ages, turns_each
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.roll_up import Release
-from rotorjax.wake.segments import far_filaments
 from rotorjax.wake.settings import wake_settings
 
 PITCH, RADIUS = 0.04, 0.75
 ZERO = jnp.zeros(())
+closure, faded, far_filaments = map(eqx.filter_jit, (far_wake.closure, far_wake.faded, segments.far_filaments))
 
 
 def model_of(height=None, **settings):

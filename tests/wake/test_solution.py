@@ -29,7 +29,7 @@ def test_hover_converges_to_a_rotor_in_hover(hover):
 def test_the_periodic_wake_is_where_the_marched_equations_rest(hover):
     inputs = inputs_of(hover.model)
     for slices in (1, 4):
-        rate = rhs(0.3, spread(hover.state, slices), inputs, hover.model)
+        rate = eqx.filter_jit(rhs)(jnp.asarray(0.3), spread(hover.state, slices), inputs, hover.model)
         assert max(float(jnp.max(jnp.abs(a))) for a in jax.tree.leaves(rate)) < 1e-5
 
 

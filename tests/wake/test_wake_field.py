@@ -8,13 +8,17 @@ import pytest
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import plane
+from rotorjax.wake import equilibrium, field
 from rotorjax.wake.biot_savart import segment_velocity
-from rotorjax.wake.equilibrium import full_state, spread
-from rotorjax.wake.field import node_velocities, self_induction, velocity, wake_segments
+from rotorjax.wake.equilibrium import spread
+from rotorjax.wake.field import self_induction
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.start import prescribed
 
+full_state, node_velocities = eqx.filter_jit(equilibrium.full_state), eqx.filter_jit(field.node_velocities)
+velocity, velocity_now = eqx.filter_jit(field.velocity), eqx.filter_jit(field.velocity_now)
+wake_segments = eqx.filter_jit(field.wake_segments)
 POINTS = jnp.array([[0.3, 0.2, -0.1], [0.7, -0.4, 0.2], [0.0, 0.0, -0.3], [1.1, 0.5, -0.05]])
 
 
@@ -46,6 +50,14 @@ def test_an_axisymmetric_wake_is_the_same_in_one_slice_or_four(case):
     four = node_velocities(model, spread(state, 4))
     for a, b in zip(one, four, strict=True):
         np.testing.assert_allclose(b, jnp.broadcast_to(a, b.shape), atol=1e-13)
+
+
+def test_one_slice_stands_for_all_blades_at_any_instant(axisymmetric):
+    model, state = axisymmetric
+    psi = jnp.asarray(0.3)
+    one = velocity_now(state, psi, POINTS, model)
+    np.testing.assert_allclose(one, velocity_now(spread(state, 4), psi, POINTS, model), atol=1e-13)
+    assert float(jnp.abs(one - velocity_now(state, 0 * psi, POINTS, model)).max()) > 1e-4
 
 
 def test_velocity_turns_with_the_blades(axisymmetric):

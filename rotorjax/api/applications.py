@@ -1,0 +1,105 @@
+"""Trims, linear models, flights and calibrations, each by one call."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotorjax.api.solved import Solved
+from rotorjax.errors import InputError
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.wake.solution import Solution
+
+if TYPE_CHECKING:
+    from rotorjax.ode.models import LinearModel, PeriodicModel
+    from rotorjax.simulation.run import Simulated
+    from rotorjax.trim.run import Result
+
+Progress = Callable[[str, float], None]
+
+
+def trim(
+    rotor: Rotor, operating: OperatingPoint, thrust_coefficient: float, progress: Progress | None = None, **flight: Any
+) -> "Result":
+    """Find the controls and the periodic blade motion of a steady flight.
+
+    flight: what `trim.run.Request` takes: inflow ("uniform", "pitt-peters", "vpbfsm" or "freewake"), advance (over ΩR),
+    height (over R), slope_deg, climb (over ΩR), tilt_deg, drag_area (m²), aim, wake (settings). Raises InputError where
+    something is not allowed or the thrust is out of reach.
+
+    >>> import rotorjax as rj
+    >>> level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", advance=0.15)
+    >>> level.converged
+    True
+    """
+    from rotorjax.trim.run import Request, run
+
+    return run(Request(rotor, operating, thrust_coefficient, **flight), progress=progress)
+
+
+def linearise(
+    about: "Solved | Result",
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    harmonics: Sequence[int] | None = (0,),
+) -> "LinearModel | PeriodicModel":
+    """Linearise the equations that are marched, about a free wake in hover or a trim with an inflow model.
+
+    inputs, outputs: names, None for all. harmonics: those that the time-invariant model keeps, (0,) for the mean;
+    None for the model that is periodic in azimuth. Time is azimuth (rad). Raises InputError where it has not converged
+    or a name is unknown, and for a trim in the free wake or a finite-state hover, which have no linear model here.
+
+    >>> import rotorjax as rj
+    >>> hover = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", azimuths=8)
+    >>> rj.linearise(hover, ["theta_0"], ["CT"]).b.shape[1]
+    1
+    """
+    from rotorjax.linearisation.system import linear_wake
+    from rotorjax.ode.harmonic import harmonic_model
+    from rotorjax.trim.linear import OUTPUTS, linear_model
+    from rotorjax.trim.run import Result
+    from rotorjax.trim.solve import Trimmed
+
+    if isinstance(about, Solved) and isinstance(about.found, Solution):
+        names = (None if v is None else tuple(v) for v in (inputs, outputs))
+        periodic = linear_wake(about.found, *names)
+    elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
+        periodic = linear_model(about.trimmed, inputs, OUTPUTS if outputs is None else outputs)
+    else:
+        raise InputError(
+            "Argument `about` must be a free wake in hover or a trim with inflow 'uniform', 'pitt-peters' or 'vpbfsm', "
+            "but is neither: trim with one of these"
+        )
+    return periodic if harmonics is None else harmonic_model(periodic, tuple(harmonics))
+
+
+def simulate(case: str | Path, progress: Callable[[str], None] | None = None) -> "Simulated":
+    """Fly a case file (`simulation.case` shows one) from its trim. Raises InputError where it cannot be flown."""
+    from rotorjax.simulation.case import read_case
+    from rotorjax.simulation.run import fly
+
+    return fly(read_case(case), progress)
+
+
+def calibrate(target: str, *data: Any, **settings: Any) -> Any:
+    """Fit by gradients: "hayden", the finite-state model's ground to Hayden's; "freewake", to a study's free wakes
+    (data: its cases.nc); "wake", the free wake's settings to Caradonna and Tung's rotor.
+
+    settings: of `calibration.hayden_run.run`, `freewake_run.run` or `measured_run.run`. Returns what these do, with the
+    values in `.fit`. Raises InputError for an unknown target and as they do.
+
+    >>> import rotorjax as rj
+    >>> sorted(rj.calibrate("hayden", parameters=("radius",)).fits)
+    ['adam', 'lbfgs', 'least_squares']
+    """
+    from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher
+    from rotorjax.checks import closest
+
+    runs = {"hayden": hayden_run.run, "freewake": freewake_run.run, "wake": measured_run.run}
+    if target not in runs:
+        raise InputError(
+            f"Argument `target` must be one of {', '.join(runs)}, but is '{target}': {closest(target, runs)}"
+        )
+    if target == "freewake" and data and isinstance(data[0], str | Path):
+        data = (teacher.find_cases(data[0]), *data[1:])
+    return runs[target](*data, **settings)
