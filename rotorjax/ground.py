@@ -82,10 +82,9 @@ def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
     if known(slope_deg) and not 0 <= number_of(slope_deg) < 60:
         found = f"{slope_deg}" if isinstance(slope_deg, int | float) else shown(slope_deg)
         raise refuse("slope_deg", "lie in [0, 60) degrees", found)
-    if known(height, slope_deg) and height <= math.tan(math.radians(slope_deg)):
-        clearance = math.tan(math.radians(slope_deg))
+    if known(height, slope_deg) and number_of(height) <= (least := math.tan(math.radians(number_of(slope_deg)))):
         raise refuse(
-            "height", f"exceed tan({slope_deg} deg) = {clearance:.3f}, where the disk cuts the ground", f"{height}"
+            "height", f"exceed tan({slope_deg} deg) = {least:.3f}, where the disk cuts the ground", f"{height}"
         )
     slope = math.radians(slope_deg) if known(slope_deg) else jnp.deg2rad(slope_deg)  # type: ignore[arg-type]
     return Plane(array(height), array(slope))

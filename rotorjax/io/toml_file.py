@@ -98,7 +98,8 @@ def _checked_table(table: str, values: dict[str, Any], keys: Mapping[str, Key]) 
         if key.required and name not in values:
             raise InputError(f"[{table}] must have the key '{name}' ({key.kind}), but it is missing")
     return {
-        name: value_of(f"[{table}] {name}", value, keys.get(name, keys.get(OTHERS))) for name, value in values.items()
+        name: value_of(f"[{table}] {name}", value, keys[name if name in keys else OTHERS])
+        for name, value in values.items()
     }
 
 

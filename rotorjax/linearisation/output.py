@@ -159,7 +159,8 @@ def _models(found: Linearised, content: dict[str, Any]) -> str:
         else "Constant in the blades' frames; axisymmetric disturbances are all that these inputs and outputs meet."
     )
     small_text = (
-        f"Reduced model: {small.frequency.model.order} states, {_kept(small.frequency)}. It is right in frequency and in time, so that "
+        f"Reduced model: {small.frequency.model.order} states, {_kept(small.frequency)}. "
+        f"It is right in frequency and in time, so that "
         "reduced_frequency and reduced_time (.nc, .mat) hold the same."
         if small.time is small.frequency
         else f"{small.frequency.model.order} states cannot hold {small.unstable} unstable modes and a response beside "

@@ -145,12 +145,9 @@ def _phase_row(name: str, z: Each[complex]) -> Row:
 def _slopes_differ(height: float) -> float:
     """Share by which the slopes of what is known of ground effect over height differ, of their mean."""
     step = 0.1  # as far apart as the measured curve's points
-    known: tuple[Callable[[float], Any], ...] = (
-        reference.hayden,
-        reference.cheeseman_bennett,
-        reference.isolated_rotors,
-    )
-    slopes = np.diff([[f(height + by) for f in known] for by in (-step, step)], axis=0)
+    known = (reference.hayden, reference.cheeseman_bennett, reference.isolated_rotors)
+    ends = np.array([[f(height + step), f(height - step)] for f in known], float)  # NaN beyond a curve's end
+    slopes = ends[:, 0] - ends[:, 1]
     return float(np.ptp(slopes) / np.mean(slopes))
 
 
