@@ -58,7 +58,8 @@ def test_more_lift_at_the_same_pitch_asks_for_less_power():
 
 def test_the_measured_rotors_rows(coarse_hover):
     assert coarse_hover.converged
-    found = caradonna_tung.compare(Subject(), dict.fromkeys(caradonna_tung.points(Subject()), coarse_hover))
+    wakes: dict = dict.fromkeys(caradonna_tung.points(Subject()), coarse_hover)
+    found = caradonna_tung.compare(Subject(), wakes)
     assert len(found.rows) == 22
     for row in [
         r for r in found.rows if r.quantity not in ("C_T at 5°", "C_T at 12°")
