@@ -40,7 +40,7 @@ INFLOW = Against(
 )
 GAIN = Against(
     SOURCE,
-    "the slopes of Hayden's and of Cheeseman and Bennett's formula over height differ by so much",
+    "the slopes over height of the measured curve, Hayden's and Cheeseman and Bennett's formula differ by so much",
     "the uncertainty of ground effect",
 )
 LINEAR = Against(

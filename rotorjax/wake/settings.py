@@ -158,7 +158,7 @@ class WakeSettings(eqx.Module):
 wake_settings = WakeSettings
 
 
-_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 50), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
+_COUNTS = (("panels", 4, 200), ("closure_turns", 0, 400), ("closure_bundles", 0, 12), ("azimuths", 1, 360))
 
 
 def _check_counts(settings: WakeSettings) -> None:

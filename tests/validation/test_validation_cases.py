@@ -58,7 +58,8 @@ def test_more_lift_at_the_same_pitch_asks_for_less_power():
 
 def test_the_measured_rotors_rows(coarse_hover):
     assert coarse_hover.converged
-    found = caradonna_tung.compare(Subject(), dict.fromkeys(caradonna_tung.points(Subject()), coarse_hover))
+    wakes: dict = dict.fromkeys(caradonna_tung.points(Subject()), coarse_hover)
+    found = caradonna_tung.compare(Subject(), wakes)
     assert len(found.rows) == 22
     for row in [
         r for r in found.rows if r.quantity not in ("C_T at 5°", "C_T at 12°")
@@ -115,7 +116,7 @@ def test_a_harmonics_change_counts_phase_and_size(coarse_hover):
     ]
     larger = replace(there[0], inflow=1.1 * there[0].inflow)
     assert grid.harmonic_change(there[0], larger, grid.FIRST["inflow"]) == pytest.approx(0.1)
-    assert grid.harmonic_change(*there, grid.FIRST["inflow"]) == pytest.approx(np.sqrt(2))
+    assert grid.harmonic_change(there[0], there[1], grid.FIRST["inflow"]) == pytest.approx(np.sqrt(2))
 
 
 def test_the_isolated_rotors_curve_judges_a_model_rotor_and_hayden_joins_in_for_a_helicopters():

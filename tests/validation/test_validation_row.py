@@ -1,5 +1,6 @@
 """Verdicts, limits and the formulas that wakes are compared with."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -73,7 +74,7 @@ def test_knight_and_hefners_polars_are_those_of_the_catalogues_rotors(blades, so
     body, operating = load(f"knight_hefner_{blades}")
     assert body.blades == blades
     assert float(solidity(body)) == pytest.approx(solidity_, abs=1e-4)
-    reynolds = operating.tip_speed(body.radius) * body.chord(1.0) / operating.viscosity
+    reynolds = operating.tip_speed(body.radius) * body.chord(jnp.ones(())) / operating.viscosity
     assert float(reynolds) == pytest.approx(242000, rel=2e-3)
     assert np.all(np.diff(polar.thrust) > 0)
     assert np.all(np.diff(polar.torque) > 0)
