@@ -7,6 +7,8 @@ rotor, operating = load("my_rotor.toml")
 from importlib import resources
 from pathlib import Path
 
+import jax
+
 from rotorjax.checks import closest, shown
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
@@ -25,15 +27,22 @@ def load(name_or_path: str | Path) -> tuple[Rotor, OperatingPoint]:
     Anything that ends in .toml or is a `Path` is read as a file. Raises InputError for a name that the catalogue does
     not have, with the closest one, and whatever `read_rotor` raises for a file.
     """
-    if isinstance(name_or_path, Path) or (isinstance(name_or_path, str) and name_or_path.endswith(".toml")):
-        return read_rotor(name_or_path)
+    path = name_or_path
+    if isinstance(path, Path) or (isinstance(path, str) and path.endswith(".toml")):
+        return _read(path)
     if name_or_path not in names():
         hint = closest(str(name_or_path), names())
         raise InputError(
             f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is "
             f"{shown(name_or_path)}: {hint}"
         )
-    return read_rotor(_folder() / f"{name_or_path}.toml")
+    return _read(_folder() / f"{name_or_path}.toml")
+
+
+def _read(path: str | Path) -> tuple[Rotor, OperatingPoint]:
+    """Read a file into concrete numbers, inside of jit too."""
+    with jax.ensure_compile_time_eval():
+        return read_rotor(path)
 
 
 def _folder() -> Path:

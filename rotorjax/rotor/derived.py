@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from rotorjax.checks import known
@@ -78,7 +79,8 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
     """Raise InputError where a rotor's derived numbers are beyond sense, by a wrong unit, or beyond its tables."""
     if not known(rotor, operating):
         return
-    found = derived(rotor, operating)
+    with jax.ensure_compile_time_eval():  # numbers, inside of jit too
+        found = derived(rotor, operating)
     if found.solidity > MOST_SOLIDITY:
         raise InputError(
             f"The solidity (blade area over disk area) must be at most {MOST_SOLIDITY:g}, but is {found.solidity:.3g}: "

@@ -122,7 +122,7 @@ def test_the_mean_velocity_of_a_wake_is_alike_all_round_and_stops_at_the_ground(
 
 
 def test_wrong_input_is_named(wake, over_ground):
-    with pytest.raises(rj.InputError, match=r"must be of rj\\.free_wake"):
+    with pytest.raises(rj.InputError, match=r"must be of rj\.free_wake"):
         rj.solve(3)
     with pytest.raises(rj.InputError, match="hayden"):
         rj.calibrate("haydn")
