@@ -67,9 +67,8 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = save_mat(LINEAR, tmp_path / "m.mat")
     before = path.read_bytes()
 
-    def broken(name, content):
-        with open(name, "w") as file:
-            file.write("half")
+    def broken(file, content):
+        file.write(b"half")
         raise OSError("disk full")
 
     monkeypatch.setattr(scipy.io, "savemat", broken)
@@ -80,5 +79,5 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_missing_folder(tmp_path):
-    with pytest.raises(InputError, match="folder must exist and be writable"):
+    with pytest.raises(InputError, match="the file must be writable, but is not: No such file"):
         save_mat(LINEAR, tmp_path / "nowhere" / "m.mat")
