@@ -180,9 +180,9 @@ def test_bad_input(models):
     assert rhs(jnp.zeros(()), state, now, model).a.shape == (6,)
 
 
-def free_rotor(solidity=0.0423, radial_terms=4, blades=True):
+def free_rotor(solidity=0.0423, radial_terms=4, blades=True, **choices):
     """A rotor far above ground."""
-    rotor = finite_state_model(radial_terms=radial_terms, quadrature=DiskQuadrature(12, 4))
+    rotor = finite_state_model(radial_terms=radial_terms, quadrature=DiskQuadrature(12, 4), **choices)
     loads = linear_blades(solidity) if blades else None
     return over_ground(rotor, ground_table(rotor, (60.0, 60.0)), loads, at=stations(0.0, 10, 1))
 
@@ -212,6 +212,8 @@ def test_step_of_collective_against_carpenter_and_fridovich(degrees, ratio):
     """0.849 λ' + 2λ² = C_T(θ, λ) without flapping (NACA TN 3044): inflow within 5 % of its end value at all times.
 
     Real linear blades load the tip more, where the air has less inertia: their inflow rises 18 % sooner to 63 %.
+    Thrust at once over thrust at rest: theirs is that of a cylinder's inflow; where the wake contracts, inflow gathers
+    at the tip and takes 3 % more of the thrust.
     """
     psi, theta = jnp.linspace(0, 60, 1201), np.deg2rad(degrees)
     free = free_rotor()
@@ -224,5 +226,6 @@ def test_step_of_collective_against_carpenter_and_fridovich(degrees, ratio):
     ).y[0]
     lam = np.array(simulate(model, at_rest_, psi, many).outputs.uniform)
     assert np.abs(lam - exact).max() < 0.05 * exact[-1]
-    thrust = np.array(simulate(free, at_rest_, psi, many).outputs.thrust)
-    np.testing.assert_allclose(thrust[0] / thrust[-1], ratio, rtol=0.01)
+    for rotor, tolerance in ((free_rotor(printed=True), 0.01), (free, 0.04)):
+        thrust = np.array(simulate(rotor, at_rest_, psi, many).outputs.thrust)
+        np.testing.assert_allclose(thrust[0] / thrust[-1], ratio, rtol=tolerance)
