@@ -25,6 +25,10 @@ TAU = jnp.zeros(9).at[:3].set(jnp.array([np.sqrt(3) / 4 * 0.006, 5e-4, 2e-4]))
 R, PSI = jnp.array([0.3, 0.6, 0.9]), jnp.array([0.0, 0.7, np.pi / 2, np.pi, 5.0])
 
 
+CYLINDER = {"wake": None, "slope": "sheared", "ground_in_mass_flow": False, "mass_flow": "paper"}
+"""A region cuts the sources; that they alone are cut shows where nothing else, wake or mass flow, knows of the ground."""
+
+
 def model(region=None, radius=None, ground=LEVEL):
     return finite_state_model(
         ground,
@@ -35,6 +39,7 @@ def model(region=None, radius=None, ground=LEVEL):
         quadrature=DiskQuadrature(24, 32),
         region=region,
         ground_radius=radius,
+        **CYLINDER,
     )
 
 
@@ -72,7 +77,7 @@ def test_region_that_holds_the_whole_disk_is_full_ground(region):
 
 
 def test_no_region_is_no_ground():
-    free, none = fields(model(half_plane(-1.4))), finite_state_model(harmonics=1)
+    free, none = fields(model(half_plane(-1.4))), finite_state_model(harmonics=1, **CYLINDER)
     np.testing.assert_allclose(free[0], inflow(steady_state(none, TAU), R, PSI, none), atol=1e-6 * 0.05)
 
 

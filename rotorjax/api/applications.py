@@ -87,10 +87,6 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
 
     settings: of `calibration.hayden_run.run`, `freewake_run.run` or `measured_run.run`. Returns what these do, with the
     values in `.fit`. Raises InputError for an unknown target and as they do.
-
-    >>> import rotorjax as rj
-    >>> sorted(rj.calibrate("hayden", parameters=("radius",)).fits)
-    ['adam', 'lbfgs', 'least_squares']
     """
     from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher
     from rotorjax.checks import closest
