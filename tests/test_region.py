@@ -26,7 +26,7 @@ R, PSI = jnp.array([0.3, 0.6, 0.9]), jnp.array([0.0, 0.7, np.pi / 2, np.pi, 5.0]
 
 
 CYLINDER = {"wake": None, "slope": "sheared", "ground_in_mass_flow": False, "mass_flow": "paper"}
-"""A region cuts the sources; that they alone are cut shows where nothing else, wake or mass flow, knows of the ground."""
+"""A region cuts the sources: seen alone where nothing else, neither wake nor mass flow, knows of the ground."""
 
 
 def model(region=None, radius=None, ground=LEVEL):

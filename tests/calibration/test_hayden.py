@@ -51,12 +51,12 @@ def test_the_default_follows_hayden_without_a_fit():
 
 
 def test_the_clearance_alone_at_one_height_is_the_same_from_every_start():
-    data, parameters = hayden.hayden_data((1.0,), ("clearance",))
+    data, parameters = hayden.hayden_data((0.5,), ("clearance",))
     many = calibrate_many(hayden.residual, parameters, data, np.linspace(0.1, 3.5, 5)[:, None])
     assert np.ptp(many.values) < 1e-6
     assert many.converged.all()
     ratio = hayden.inflow_ratio(data, jnp.asarray(hayden.PARAMETERS.printed[0]), many.values[0, 0])
-    np.testing.assert_allclose(ratio, 1 / (0.9926 + 0.0379 * 4), atol=1e-6)
+    np.testing.assert_allclose(ratio, 1 / (0.9926 + 0.0379 * 16), atol=1e-6)
 
 
 def test_two_parameters_follow_hayden_over_six_heights(both):
@@ -129,8 +129,8 @@ def test_bad_input_is_named(message):
 
 
 def test_targets_out_of_reach_are_refused():
-    """With so much load on τ₃ the model's ground effect is too strong for Hayden's factor with any values."""
-    tau = np.array([[1e-3, 2e-3, 0.0]])
+    """With so much load taken off by τ₃ the model's ground effect is too weak for Hayden's factor with any values."""
+    tau = np.array([[1e-3, -2e-3, 0.0]])
     with pytest.raises(InputError, match=r"where the model can reach Hayden's factor, but at 0\.5"):
         hayden.hayden_data((0.5,), ("clearance",), tau=(tau, tau[0]))
 
