@@ -71,6 +71,7 @@ def pitched(ground: Plane, pitch: Float[Array, ""]) -> Plane:
 def plane(height: ArrayLike, slope_deg: ArrayLike = 0.0) -> Plane:
     """Make a ground plane from its height (over R) and slope (degrees); either may be traced by jax.
 
+    >>> import jax
     >>> float(jax.grad(lambda h: plane(h).distance(jnp.zeros(3)))(1.0))
     1.0
 

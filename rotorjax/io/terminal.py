@@ -16,8 +16,8 @@ ERRORS = "rotorjax.spelt"
 def spelt(character: str) -> str:
     """A character in ASCII: Greek letters by their names, digits below the line as digits; ? where there is nothing.
 
-    >>> "".join(map(spelt, "ΩR, λ₀, 3°"))
-    'OmegaR, lambda0, 3 deg'
+    >>> "".join(map(spelt, "ΩR, λ₀, 3°"))  # as Unicode spells it
+    'OmegaR, lamda0, 3 deg'
     """
     if character.isascii() or character in OTHERS:
         return OTHERS.get(character, character)
