@@ -19,7 +19,7 @@ def test_hayden_writes_everything(tmp_path, capsys):
     assert found["largest_difference_of_drivers"] <= 1e-4
     assert found["starts"]["converged"] == hayden_run.STARTS
     assert found["starts"]["spread"] < 1e-5
-    assert found["wall_time_s"] < 120  # on a busy machine; a contracting wake takes 30 times a cylinder's time
+    assert found["wall_time_s"] < 10
     assert len(found["covariance"]) == 2
     saved = load(out / "calibration.toml")
     assert saved.parameters == pytest.approx({n: found[n] for n in ("radius", "clearance")})
