@@ -21,8 +21,8 @@ PRINTED = {
     "hayden": Calibration("hayden", hayden.PARAMETERS.table(hayden.PARAMETERS.printed), True, 0.18),
     "freewake": Calibration("freewake", taught.PARAMETERS.table(taught.PARAMETERS.printed), True, 0.3),
 }
-# a wake that contracts near the ground too: less ground effect
-FITTED = Calibration("hayden", {"radius": 0.7, "clearance": 0.3}, False, 0.004)
+# a wake that contracts much, near the ground too: less ground effect
+FITTED = Calibration("hayden", {"radius": 0.52, "clearance": 0.05}, False, 0.004)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_printed_values_give_the_studys_inflow(solved, settings, name):
 def test_a_fitted_factor_changes_the_numbers_and_says_that_it_did_not_converge(solved, settings):
     data, reference = solved
     found = apply.add_calibrated(data, settings, FITTED)
-    assert float(found["calibrated_mean_inflow"]) > 1.03 * float(data["vpbfsm_mean_inflow"])
+    assert float(found["calibrated_mean_inflow"]) > 1.1 * float(data["vpbfsm_mean_inflow"])
     entry = apply.entry(found, reference, FITTED)
     assert entry["inflow_rms_difference"] > 0
     assert "NOT CONVERGED" in apply.table(found, reference, FITTED)
@@ -66,7 +66,7 @@ def test_loads_of_the_calibrated_inflow_reproduce_themselves(tmp_path, capsys):
         thrust["own"] = found["vpbfsm"]["CT"]
     assert thrust["printed"] == pytest.approx(thrust["own"], rel=1e-8)
     assert thrust["fitted"] < 0.99 * thrust["own"]
-    assert "VPBFSM calibrated: hayden, radius 0.7, clearance 0.3" in capsys.readouterr().out
+    assert "VPBFSM calibrated: hayden, radius 0.52, clearance 0.05" in capsys.readouterr().out
 
 
 def test_an_unsolved_case_is_refused(solved, settings):

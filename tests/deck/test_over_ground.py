@@ -43,16 +43,16 @@ def at_rest(collective=8.0, height=1.0, slope_deg=5.0, climb=0.0):
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_trim_over_ground_at_rest_is_the_steady_model(variant, models):
     """The ground in the mass flow comes from the table, and has its accuracy."""
-    check_trim(models[variant], {}, atol=5e-7)
+    check_trim(models[variant], {}, tilt=-0.0005, atol=5e-7)
 
 
 def test_trim_without_the_ground_in_the_mass_flow_is_the_steady_model():
     choices = {"printed": True, "strengths": "closed"}
     rotor = finite_state_model(harmonics=1, radial_terms=2, ground_harmonics=1, quadrature=ROTOR.quadrature, **choices)
-    check_trim(make("static", rotor=rotor), choices, atol=1e-10)
+    check_trim(make("static", rotor=rotor), choices, tilt=-0.0015, atol=1e-10)
 
 
-def check_trim(model, choices, **tolerance):
+def check_trim(model, choices, tilt, **tolerance):
     now = at_rest()
     state = trim(model, now)
     found = output(jnp.zeros(()), state, now, model)
@@ -62,7 +62,7 @@ def check_trim(model, choices, **tolerance):
     expected = steady_state(steady, found.tau)
     np.testing.assert_allclose(state.a, expected.a, rtol=0.0, **tolerance)
     np.testing.assert_allclose(found.uniform, mean_inflow(expected, steady), rtol=1e-5)  # the table's accuracy
-    assert found.cosine < -0.0005  # less inflow where the ground is near
+    assert found.cosine < tilt  # less inflow where the ground is near; sheared sources make it three times as much
     assert abs(found.sine) < 1e-12
 
 
