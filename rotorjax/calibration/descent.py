@@ -36,6 +36,7 @@ def descend(
     scale = jnp.where(scale > 0, scale, 1.0)
     size = max(1, max_steps // BLOCKS)
     carry: Any = (z, _solver(method, max_steps).init(z), (jnp.asarray(jnp.inf), z))
+    carry = jax.tree.map(lambda x: jnp.asarray(x, x.dtype), carry)  # weak types, which no step returns: compiled twice
     for done in range(size, max_steps + 1, size):
         carry, values, slopes = _block(unknown, data, carry, scale, method, max_steps, size)
         history += np.sqrt(np.asarray(values) * float(scale)).tolist()

@@ -17,7 +17,7 @@ from rotorjax.calibration.hayden import HaydenData
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 
-STARTS = 16
+STARTS = 8
 STEPS = {"adam": 2000}  # enough to end within 1e-6 of least squares; the others' own numbers
 
 
