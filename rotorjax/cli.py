@@ -104,6 +104,7 @@ def _set_up_jax(xla_flags: str = "") -> Path | None:
     exceptions.
     """
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # read when jax is imported
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # its threads wait by spinning, in each of XLA's own threads
     if "jax" not in sys.modules:
         os.environ["XLA_FLAGS"] = f"{xla_flags} {os.environ.get('XLA_FLAGS', '')}".strip()  # the user's own come last
     import jax

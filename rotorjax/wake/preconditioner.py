@@ -53,9 +53,13 @@ def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int, found: Evaluatio
 def _inverse(
     model: FreeWake, x: Unknowns, found: Evaluation, responses: list[Array], direct: list[bool], slices: int
 ) -> HarmonicInverse:
-    """Invert J_p for harmonics that answer with `responses`, or with their conjugates where not `direct`."""
+    """Invert J_p for harmonics that answer with `responses`, or with their conjugates where not `direct`.
+
+    One after the other: a batch is shared out to the threads that run the programs, and where each of them waits for
+    its share to be done by another all wait for ever (jaxlib 0.10; two wakes at a time on two cores).
+    """
     whole = jnp.stack([r if d else jnp.conj(r) for r, d in zip(responses, direct, strict=True)])
-    return HarmonicInverse(jnp.linalg.inv(_jacobian(model, x, found, whole, slices)))
+    return HarmonicInverse(jax.lax.map(jnp.linalg.inv, _jacobian(model, x, found, whole, slices)))
 
 
 def _jacobian(model: FreeWake, x: Unknowns, found: Evaluation, responses: Complex[Array, "P N 3 m"], slices: int):

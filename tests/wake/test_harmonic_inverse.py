@@ -1,5 +1,7 @@
 """Dense derivatives of the wake's velocities, and the inverse Jacobian that is made of them."""
 
+import re
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 
 from rotorjax.ground import plane
+from rotorjax.wake import preconditioner
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.equilibrium import residual, spread
 from rotorjax.wake.influence import pair_derivatives
@@ -42,8 +45,9 @@ def test_pair_derivatives_are_those_of_the_kernel():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ground", [None, plane(0.9)], ids=["free", "level"])
-def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, ground):
+def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, ground, monkeypatch):
     """Any axisymmetric wake will do, solved or not: the identity is algebra."""
+    inversion, asked = spied_inversion(monkeypatch)
     settings = wake_settings(
         panels=5, age_step_deg=30.0, near_wake_deg=120.0, closure_turns=1, closure_bundles=1, azimuths=8
     )
@@ -56,6 +60,16 @@ def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, 
     back = eqx.filter_jit(lambda w: jax.jvp(lambda y: residual(y, model), (everywhere,), (w,))[1])(w)
     for a, b in zip(back, v, strict=True):
         np.testing.assert_allclose(a, b, atol=1e-8)
+    factorised = re.findall(r"lapack_zgetrf\w*\(.*-> \(tensor<([\dx]+)xcomplex", inversion.lower(*asked).as_text())
+    assert factorised, "the program factorises nothing"
+    assert all(shape.count("x") == 1 for shape in factorised), "a batch may wait for ever, see _inverse"
+
+
+def spied_inversion(monkeypatch):
+    """What inverts the matrices, and a list that holds the arguments once it is called."""
+    asked, inverse = [], preconditioner._inverse
+    monkeypatch.setattr(preconditioner, "_inverse", lambda *args: asked.extend(args) or inverse(*args))
+    return inverse, asked
 
 
 def test_laid_level_keeps_a_level_wake_and_raises_a_sloped_one_above_the_ground(uh60, coarse):
