@@ -9,7 +9,12 @@ from rotorjax.wake.solution import Solution
 COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "closure_turns": 1, "closure_bundles": 2}
 """Settings that the tests and a notebook share, so that their programs are compiled once."""
 
-STATE_SHAPES = {"near": (15, 2, 3), "far": (2, 8, 3), "gamma_near": (14, 2), "gamma_far": (2, 8), "gamma_bound": (14,)}
+
+def state_shapes(settings) -> dict[str, tuple[int, ...]]:
+    """Of one slice's state, by name."""
+    panels, strands = settings.panels, (settings.filaments, settings.far_ages)
+    near = {"near": (panels + 1, settings.near_ages, 3), "gamma_near": (panels, settings.near_ages)}
+    return near | {"far": (*strands, 3), "gamma_far": strands, "gamma_bound": (panels,)}
 
 
 class MadeUp(Solution):
@@ -37,7 +42,8 @@ def made_up(model: FreeWake, start: Solution | None = None, progress=None, *, co
     thrust = float(np.mean(dct_dr @ widths))
     ages = np.linspace(0, 4 * np.pi, 25)
     path = np.stack([np.cos(psi[:, None] - ages), np.sin(psi[:, None] - ages), np.tile(-0.05 * ages, (count, 1))], -1)
-    state = WakeState(**{k: jnp.full((count, *v), 0.5 + height if slope else 0.5) for k, v in STATE_SHAPES.items()})
+    value, shapes = 0.5 + height if slope else 0.5, state_shapes(model.settings)
+    state = WakeState(**{k: jnp.full((count, *v), value) for k, v in shapes.items()})
     numbers = {
         "converged": converged,
         "why": "made up" if converged else "made up to fail",

@@ -106,6 +106,18 @@ class Solved(eqx.Module):
         age = np.tile(np.rad2deg(self.found.tip_vortex_age), count)
         write_polydata(path, paths.reshape(-1, 3), lines.tolist(), [], {"age_deg": age}, "tip vortices over R")
 
+    def to_html(self, path: str | Path) -> None:
+        """Write the free wake as a page in which it can be turned, offline; needs a browser with WebGL.
+
+        Raises InputError for another model.
+        """
+        from rotorjax.bench.wake_scene import solved_scene
+        from rotorjax.io.scene import write_scene
+
+        if not isinstance(self.found, Solution):
+            raise InputError("Argument `path` must be given to a free wake's solution, but this has no vortices")
+        write_scene(path, solved_scene(self.found))
+
 
 NUMBERS = {
     "CT": "thrust coefficient T/(ρA(ΩR)²)",

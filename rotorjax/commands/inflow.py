@@ -18,6 +18,8 @@ from rotorjax.commands.arguments import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from rotorjax.bench.settings import StudySettings
+
 
 def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
@@ -36,6 +38,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument("--quick", action="store_true", help="coarser free wake")
     parser.add_argument("--plot", type=Path, metavar="FILE", help="picture: .png, .pdf or .svg")
+    parser.add_argument("--html", type=Path, metavar="FILE", help="page in which the free wake can be turned, offline")
     parser.add_argument("--json", type=Path, metavar="FILE", help="numbers, with the keys of a case of summary.json")
     parser.add_argument("--netcdf", type=Path, metavar="FILE", help="all arrays, labelled")
     add_harmonics(parser)
@@ -51,6 +54,7 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.bench.settings import study_settings
     from rotorjax.bench.single import check_case, single_case
     from rotorjax.bench.single_output import check_picture, table
+    from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output
 
     case = case_of(chosen)
@@ -61,7 +65,9 @@ def run(chosen: argparse.Namespace) -> int:
     )
     check_case(case, settings, chosen.model)
     check_picture(chosen.plot)
-    for path in (chosen.plot, chosen.json, chosen.netcdf):
+    if chosen.html is not None and chosen.model == "vpbfsm":
+        raise InputError("Argument `--html` shows a free wake, but --model is vpbfsm: take freewake or both")
+    for path in (chosen.plot, chosen.html, chosen.json, chosen.netcdf):
         check_output(path)  # before the work, not after it
     introduce(settings.rotor, settings.operating)
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
@@ -79,6 +85,8 @@ def run(chosen: argparse.Namespace) -> int:
         print(apply.table(data, reference, calibration))
         entry |= {"calibrated": apply.entry(data, reference, calibration)}
     _write(chosen, data, entry, reference)
+    if chosen.html is not None:
+        _write_wake(chosen.html, data, settings)
     return 0 if bool(data.get("converged", 1)) else 1
 
 
@@ -95,3 +103,11 @@ def _write(chosen: argparse.Namespace, data: "xr.Dataset", entry: dict[str, Any]
         from rotorjax.bench.single_picture import picture
 
         picture(data, reference, chosen.plot)
+
+
+def _write_wake(path: Path, data: "xr.Dataset", settings: "StudySettings") -> None:
+    from rotorjax.bench.wake_file import to_solution
+    from rotorjax.bench.wake_scene import solved_scene
+    from rotorjax.io.scene import write_scene
+
+    write_scene(path, solved_scene(to_solution(data, settings)))

@@ -58,7 +58,7 @@ def run(chosen: argparse.Namespace) -> int:
     # a PDF's fonts take longer than its picture, and a first look needs none
     formats = ("png",) if chosen.quick else ("png", "pdf")
     write_all(result.cases, settings, chosen.out, started, formats, None if changes else calibration)
-    print(f"{len(result.cases)} cases in {time.perf_counter() - started:.0f} s: {chosen.out / 'report.md'}")
+    print(f"{len(result.cases)} cases in {time.perf_counter() - started:.0f} s: {chosen.out / 'report.html'}")
     if result.diverged:
         print("not converged: " + ", ".join(result.diverged))
     return 1 if result.diverged else 0

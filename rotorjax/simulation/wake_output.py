@@ -1,73 +1,32 @@
 """The free wake of a flight as labelled arrays and as files for ParaView."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from rotorjax.coupled import CoupledState, blades_at
 from rotorjax.coupled_wake import CoupledWake, model_of
-from rotorjax.frames import rotate_about_shaft
 from rotorjax.io import vtk
 from rotorjax.io.atomic import make_folder
-from rotorjax.rotor import geometry
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.run import SAVES, Simulated
-from rotorjax.wake.far_wake import cores
-from rotorjax.wake.segments import lattice_nodes, releases
+from rotorjax.wake.seen import Seen, seen_slice
 
 KINDS = {"blade": 0, "tip vortex": 1, "inboard filament": 2}
 """Numbers of `kind` in the VTK files."""
 
 
-class Seen(NamedTuple):
-    """A wake at one instant, seen from the hub: x aft, y to starboard, z up, lengths over R, strengths over ΩR².
-
-    filaments (B, F, A, 3): nodes from the release on, tip vortex first. circulation (B, F, A): at them. core
-    (B, F, A − 1): of the segments between. lattice (B, R + 1, A_N + 1, 3): near wake, lifting line first. leading,
-    trailing (B, R + 1, 3): edges of the blades. bound (B, R): circulation.
-    """
-
-    filaments: Float[Array, "B F A 3"]
-    circulation: Float[Array, "B F A"]
-    core: Float[Array, "B F A1"]
-    lattice: Float[Array, "B R1 AN1 3"]
-    leading: Float[Array, "B R1 3"]
-    trailing: Float[Array, "B R1 3"]
-    bound: Float[Array, "B R"]
-
-
 def seen(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Seen:
-    """Look at the wake of a state."""
+    """Look at the wakes of all blades of a state."""
     blades = blades_at(x, u, p)
     model = model_of(u, blades, p)
-    r = model.edges
-    chord = geometry.chord(p.rotor, r)[:, None]
-
-    def one(k, psi, theta, slice_):
-        own = model.of_slice(k)
-        assert own.flight is not None
-        start = releases(own, slice_)
-        filaments = jnp.concatenate([start.points[:, None], slice_.far], axis=1)
-        circulation = jnp.concatenate([start.strength[:, None], slice_.gamma_far], axis=1)
-        core = cores(own, start.strength[0])[:, : slice_.far.shape[1]]
-        pitch = (theta + geometry.twist(p.rotor, r))[:, None]
-        _, forward, up = own.flight.axes
-        ahead = jnp.cos(pitch) * forward + jnp.sin(pitch) * up
-        lattice = lattice_nodes(own, slice_.near)
-        leading, trailing = own.leading + 0.25 * chord * ahead, own.leading - 0.75 * chord * ahead
-        filaments, lattice, leading, trailing = (
-            rotate_about_shaft(v, psi) for v in (filaments, lattice, leading, trailing)
-        )
-        return Seen(filaments, circulation, core, lattice, leading, trailing, slice_.gamma_bound)
-
-    rows = (jnp.arange(p.rotor.blades), blades.psi, blades.theta, x.inflow)
-    return jax.vmap(one)(*rows)
+    rows = (jnp.arange(p.rotor.blades), x.inflow, blades.psi, blades.theta)
+    return jax.vmap(lambda k, now, psi, theta: seen_slice(model.of_slice(k), now, psi, theta))(*rows)
 
 
 @eqx.filter_jit

@@ -1,20 +1,25 @@
-"""What a study leaves behind: cases.nc, summary.json, figures and report.md."""
+"""What a study leaves behind: cases.nc, summary.json, figures, the wakes to turn, report.md and the same as a page."""
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from rotorjax.bench.dataset import combine, reference_inflow
+from rotorjax.bench.flapping import RIGID
 from rotorjax.bench.record import inflow_rms_difference, summary_entry
 from rotorjax.bench.settings import StudySettings
-from rotorjax.bench.wake_file import case_of
+from rotorjax.bench.wake_file import case_of, to_solution
+from rotorjax.bench.wake_scene import solved_scene
 from rotorjax.calibration import apply
 from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.io import netcdf
-from rotorjax.io.atomic import write_json, write_text
+from rotorjax.io.atomic import make_folder, write_json, write_text
+from rotorjax.io.page import write_page
+from rotorjax.io.scene import write_scene
 from rotorjax.study.figures import draw_all
 from rotorjax.study.report import report
 
@@ -40,9 +45,24 @@ def write_all(
     netcdf.write(folder / "cases.nc", merged)
     drawn, missing = draw_all(merged, folder, formats)
     wall = time.perf_counter() - started
-    write_text(folder / "report.md", report(merged, drawn, missing, wall))
+    text = report(merged, drawn, missing, _write_wakes(cases, settings, folder), wall)
+    write_text(folder / "report.md", text)
+    write_page(folder / "report.html", text)
     write_json(folder / "summary.json", summary(cases, settings, wall, calibration))
     return merged
+
+
+def _write_wakes(cases: Sequence[xr.Dataset], settings: StudySettings, folder: Path) -> dict[str, str]:
+    """A page for each converged wake, of the rigid blades as they are kept; {label of the case: file}."""
+    written = {}
+    for data in cases:
+        if not bool(data["converged"]):
+            continue
+        rigid = {attribute: float(data[name]) for name, (attribute, _) in RIGID.items() if name in data}
+        wake = replace(to_solution(data, settings), **rigid, **({"CP": float("nan")} if rigid else {}))
+        written[case_of(data).label] = f"wakes/{case_of(data).name}.html"
+        write_scene(make_folder(folder / "wakes") / f"{case_of(data).name}.html", solved_scene(wake))
+    return written
 
 
 def summary(

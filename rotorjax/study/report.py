@@ -2,7 +2,7 @@
 
 import resource
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from json import loads
 
 import numpy as np
@@ -23,21 +23,26 @@ from rotorjax.study.reading import Reading
 TABLE_R = (0.25, 0.4, 0.55, 0.7, 0.8, 0.9, 0.95)
 
 
-def report(merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wall_time_s: float) -> str:
-    """The report in Markdown. drawn, missing: figures that were and were not drawn; wall_time_s: of this run."""
+def report(
+    merged: xr.Dataset, drawn: Sequence[str], missing: Sequence[str], wakes: Mapping[str, str], wall_time_s: float
+) -> str:
+    """The report in Markdown. drawn, missing: figures that were and were not drawn; wakes: files of those that can be
+    turned, by their case; wall_time_s: of this run.
+    """
     reading = Reading(merged)
     claims = paper_claims(reading)
     parts = [
         "# Rotor inflow in ground effect: free vortex wake and VPBFSM",
         _answer(reading, claims),
         _introduction(merged, wall_time_s),
-        "## Cases\n\n" + _case_table(reading),
-        *(["## Flapping blades\n\n" + flapping_table(reading)] if "flap" in merged else []),
+        "## Where the two models part, and why\n\n" + where_they_part(reading),
+        "## The paper's claims\n\n" + _claim_table(claims),
+        *(["## The wakes, to turn\n\n" + _wakes(wakes)] if wakes else []),
+        "## Figures\n\n" + _figures(reading, drawn, missing),
         *(["## Calibrated model\n\n" + _calibrated(reading)] if "calibrated_inflow" in merged else []),
         "## What both models must show\n\n" + _claim_table(checks(reading)),
-        "## The paper's claims\n\n" + _claim_table(claims),
-        "## Where the two models part, and why\n\n" + where_they_part(reading),
-        "## Figures\n\n" + _figures(reading, drawn, missing),
+        "## Cases\n\n" + _case_table(reading),
+        *(["## Flapping blades\n\n" + flapping_table(reading)] if "flap" in merged else []),
         "## Settings\n\n" + _settings(merged),
     ]
     return "\n\n".join(parts) + "\n"
@@ -62,7 +67,7 @@ def _answer(reading: Reading, claims: Sequence[Claim]) -> str:
     wall = float(reading.merged["wall_time_s"].mean())
     lines = [
         "**Does the finite-state model follow the free wake?** Rms difference of the inflow over the mean out of "
-        "ground effect, default choices, and the paper's own in brackets:",
+        "ground effect, default choices, and the paper's own in brackets:\n",
         f"1. Out of ground effect: {spans([OGE])}.",
         f"2. Over level ground: {spans(level)}; within {GOOD_AGREEMENT:.2f} at {', '.join(within) or 'no height'}.",
         f"3. On slopes: {spans(slopes)}; valley less mountain is {min(tilts):.1f} to {max(tilts):.1f} times the free "
@@ -168,6 +173,12 @@ def _claim_table(claims: Sequence[Claim]) -> str:
             both = f"{c.evidence}. As printed: {c.printed_evidence}"
             rows.append((c.where, c.text, verdict[c.holds], verdict[c.printed_holds], both))
     return table(["where", "claim", "verdict", "as printed", "evidence"], rows)
+
+
+def _wakes(wakes: Mapping[str, str]) -> str:
+    """Links."""
+    pages = ", ".join(f"[{label}]({file})" for label, file in wakes.items())
+    return f"With rigid blades, from which flapping ones start; each a page that opens offline: {pages}."
 
 
 def _figures(reading: Reading, drawn: Sequence[str], missing: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""What `rotorjax validate` leaves behind: pictures, validation.json and validation.md."""
+"""What `rotorjax validate` leaves behind: pictures, validation.json, validation.md and the same as a page."""
 
 from pathlib import Path
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 from rotorjax import __version__
 from rotorjax.bench import plotting
 from rotorjax.io.atomic import write_json, write_text
+from rotorjax.io.page import write_page
 from rotorjax.validation.report import report
 from rotorjax.validation.run import Validation
 
@@ -16,7 +17,9 @@ def write(found: Validation, folder: str | Path) -> None:
     for case, compared in zip(found.cases, found.comparisons, strict=True):
         plotting.save(compared.draw(), folder / case.name)
     write_json(folder / "validation.json", summary(found))
-    write_text(folder / "validation.md", report(found))
+    text = report(found)
+    write_text(folder / "validation.md", text)
+    write_page(folder / "validation.html", text)
 
 
 def summary(found: Validation) -> dict[str, Any]:

@@ -162,7 +162,7 @@ def test_a_wake_that_was_lost_on_the_way_is_not_shown_as_the_case(tmp_path, sett
     merged = combine(result.cases, settings)
     drawn, missing = draw_all(merged, tmp_path, ("png",))
     assert {"fig11", "fig12"} <= set(missing)
-    assert "(**lost at h = 1, δ = 7.5°**, whose numbers these are)" in report(merged, drawn, missing, 1.0)
+    assert "(**lost at h = 1, δ = 7.5°**, whose numbers these are)" in report(merged, drawn, missing, {}, 1.0)
     title = title_of(lost)
     assert title.startswith("h = 1, δ = 7.5° (NOT the case")
     assert title in table(lost, settings, None)

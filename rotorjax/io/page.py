@@ -1,0 +1,38 @@
+"""Markdown reports as one HTML page that opens offline: pictures inside, tables that sort by a click on their head."""
+
+import base64
+import html
+import re
+from pathlib import Path
+
+from rotorjax.io.atomic import write_text
+
+TEMPLATE = Path(__file__).with_name("page.html")
+KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif"}
+
+
+def write_page(path: str | Path, text: str) -> None:
+    """Write Markdown as a page. Pictures are taken from the page's folder; one that is not there stays a link.
+
+    The title is the first heading. Raises InputError where the file cannot be written.
+    """
+    from markdown import Markdown
+
+    path = Path(path)
+    maker = Markdown(extensions=["tables", "toc", "sane_lists"], extension_configs={"toc": {"toc_depth": "2-2"}})
+    body = re.sub(r'<img ([^>]*?)src="([^"]+)"', lambda m: _embedded(m, path.parent), maker.convert(text))
+    body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
+    heading = re.search(r"^# (.+)$", text, re.MULTILINE)
+    page = TEMPLATE.read_text(encoding="utf-8")
+    title = html.escape(heading[1] if heading else path.stem)
+    for name, content in {"title": title, "contents": getattr(maker, "toc", ""), "body": body}.items():
+        page = page.replace("{{" + name + "}}", content)
+    write_text(path, page)
+
+
+def _embedded(match: re.Match[str], folder: Path) -> str:
+    picture = folder / html.unescape(match[2])
+    if picture.suffix not in KINDS or not picture.is_file():
+        return match[0]
+    content = base64.b64encode(picture.read_bytes()).decode()
+    return f'<img loading="lazy" {match[1]}src="data:{KINDS[picture.suffix]};base64,{content}"'
