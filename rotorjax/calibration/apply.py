@@ -94,17 +94,17 @@ def _self_consistent(
     """The pressure terms whose calibrated inflow gives them back, from those of the printed model."""
     rotor, operating, climb = settings.rotor, settings.operating, settings.climb_ratio
 
-    def state_of(tau):
-        return calibration.apply(model, tau, climb)[1]
+    def inflow_of(tau):
+        return disk_inflow(calibration.apply(model, tau, climb)[1], *stations.xy, calibrated)
 
     calibrated = calibration.apply(model, start, climb)[0]
-    tau, found = self_consistent(start, state_of, calibrated, rotor, operating, stations)
+    tau, found = self_consistent(start, inflow_of, calibrated, rotor, operating, stations)
     if not bool(found) or not float(loading.thrust_coefficient(tau, model.modes)) > 0:
         raise InputError(
             "Argument `calibration` must let the rotor find a loading that thrusts upward, but with "
             + ", ".join(f"{k} = {v:.4g}" for k, v in _values(calibration))
             + " no steady one was found"
         )
-    down = disk_inflow(state_of(tau), *stations.xy, calibrated) + climb
+    down = inflow_of(tau) + climb
     total = rotor_coefficients(rotor, blade_loads(down, rotor, operating, stations), stations.r, stations.widths)
     return tau, {"CT": float(total.thrust), "CP_induced": float(total.induced)}

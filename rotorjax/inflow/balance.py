@@ -13,7 +13,14 @@ from rotorjax.errors import InputError
 from rotorjax.inflow.momentum import VORTEX_RING
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential import loading
-from rotorjax.potential.model import FiniteState, FiniteStateModel, disk_inflow, mean_inflow, steady_state
+from rotorjax.potential.model import (
+    FiniteState,
+    FiniteStateModel,
+    UnitStates,
+    steady_state,
+    unit_inflow,
+    unit_states,
+)
 from rotorjax.rotor.blade_element import SectionLoads, disk_loading, rotor_coefficients, section_loads
 from rotorjax.rotor.geometry import Rotor
 
@@ -71,17 +78,19 @@ def stations_of(rotor: Rotor, panels: int = PANELS, azimuths: int = AZIMUTHS) ->
     return Stations(0.5 * (edges[1:] + edges[:-1]), jnp.diff(edges), jnp.asarray(psi, edges.dtype))
 
 
-def axial_state(model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""]) -> FiniteState:
+def axial_state(
+    model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""], unit: UnitStates | None = None
+) -> FiniteState:
     """Steady states in any axial flight that momentum theory knows; a thrust down is one up, upside down.
 
-    In the windmill brake state, out of ground effect, the air goes up with V_T = −(V_c + v) and V̄ = −(V_c + 2v); else
-    `steady_state`.
+    unit: of the model, where it is at hand. In the windmill brake state, out of ground effect, the air goes up with V_T
+    = −(V_c + v) and V̄ = −(V_c + 2v); else `steady_state`.
     """
     thrust = loading.thrust_coefficient(tau, model.modes)
     sign = jnp.where(thrust < 0, -1.0, 1.0)
     tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
     windmill = climb <= VORTEX_RING[0] * hover
-    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb))
+    state = steady_state(model, tau, jnp.where(windmill, 0.0, climb), unit)
     if model.ground is None:
         inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
         through, varying = inner - climb / 2, 2 * inner
@@ -98,7 +107,8 @@ def balance(
     thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. No tip
     loss beyond what the expansion has. Raises InputError where none is found, under jit an error at run time.
     """
-    tau, found = _search(model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
+    flow = _flow(model, stations)
+    tau, found = _search(flow, model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
     pitch = f"at {np.rad2deg(float(operating.collective)):g} deg " if known(operating.collective) else ""
     words = (
         f"Argument `collective` must give a loading that thrusts {'up' if thrust > 0 else 'down'}ward, but {pitch}no "
@@ -106,23 +116,40 @@ def balance(
     )
     if known(found) and not bool(found):
         raise InputError(words)
-    return _read(eqx.error_if(tau, ~found, words), model, rotor, operating, stations)
+    return _read(eqx.error_if(tau, ~found, words), flow, model, rotor, operating, stations)
+
+
+class _Flow(eqx.Module):
+    """unit: of a model. at (M, K, R): inflow of unit rotor states at the stations."""
+
+    unit: UnitStates
+    at: Float[Array, "M K R"]
 
 
 @eqx.filter_jit
-def _search(model, rotor, operating, stations: Stations, thrust):
+def _flow(model: FiniteStateModel, stations: Stations) -> _Flow:
+    unit = unit_states(model)
+    return _Flow(unit, unit_inflow(model, unit, *stations.xy))
+
+
+@eqx.filter_jit
+def _search(flow: _Flow, model, rotor, operating, stations: Stations, thrust):
     """Pressure terms in balance, and whether they are and thrust as the first ones do."""
     start = jnp.zeros(len(model.modes), stations.r.dtype).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * thrust)
     climb = operating.climb_ratio(rotor.radius)
-    tau, found = self_consistent(start, lambda tau: axial_state(model, tau, climb), model, rotor, operating, stations)
+
+    def inflow_of(tau):
+        return jnp.tensordot(axial_state(model, tau, climb, flow.unit).a, flow.at, 1)
+
+    tau, found = self_consistent(start, inflow_of, model, rotor, operating, stations)
     return tau, found & (loading.thrust_coefficient(tau, model.modes) * thrust > 0)
 
 
 @eqx.filter_jit
-def _read(tau, model, rotor, operating, stations: Stations) -> Balance:
+def _read(tau, flow: _Flow, model, rotor, operating, stations: Stations) -> Balance:
     climb = operating.climb_ratio(rotor.radius)
-    state = axial_state(model, tau, climb)
-    induced = disk_inflow(state, *stations.xy, model)
+    state = axial_state(model, tau, climb, flow.unit)
+    induced = jnp.tensordot(state.a, flow.at, 1)
     loads = blade_loads(induced + climb, rotor, operating, stations)
     total = rotor_coefficients(rotor, loads, stations.r, stations.widths)
     return Balance(
@@ -137,25 +164,25 @@ def _read(tau, model, rotor, operating, stations: Stations) -> Balance:
         CP=total.power,
         CP_induced=total.induced,
         CP_profile=total.profile,
-        mean_inflow=mean_inflow(state, model),
+        mean_inflow=(flow.unit.down - flow.unit.up) @ state.a,
     )
 
 
 def self_consistent(
     start: Float[Array, " M"],
-    state_of: Callable[[Float[Array, " M"]], FiniteState],
+    inflow_of: Callable[[Float[Array, " M"]], Float[Array, "K R"]],
     model: FiniteStateModel,
     rotor: Rotor,
     operating: OperatingPoint,
     stations: Stations,
 ) -> tuple[Float[Array, " M"], Array]:
-    """Pressure terms whose inflow, of the states that `state_of` makes of them, gives them back; and whether found."""
+    """Pressure terms whose inflow at the stations, made of them by `inflow_of`, gives them back; and whether found."""
     import optimistix as optx  # takes a quarter of a second to load, and given loads need none of it
 
     climb = operating.climb_ratio(rotor.radius)
 
     def residual(tau, _):
-        down = disk_inflow(state_of(tau), *stations.xy, model) + climb
+        down = inflow_of(tau) + climb
         return pressure(disk_loading(rotor, blade_loads(down, rotor, operating, stations)), stations, model) - tau
 
     rtol = tolerance(start.dtype)

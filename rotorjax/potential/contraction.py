@@ -104,7 +104,9 @@ def _means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
 
 def disk_means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
     """Return the area-weighted mean inflow of each mode's unit state: 2/√3 of the first, as in the cylinder."""
-    return 2 / sqrt(3) / _means(FIRST, wake)[0] * _means(modes, wake)
+    means = _means(modes, wake)
+    first = means[modes.index(0, 1)] if FIRST.modes[0] in modes.modes else _means(FIRST, wake)[0]
+    return 2 / sqrt(3) / first * means
 
 
 def disk_flow(

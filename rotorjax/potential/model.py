@@ -298,11 +298,35 @@ def answer_means(model: FiniteStateModel) -> Float[Array, " M"]:
     """Return the mean upflow of the ground's answer to unit rotor states, zero where the mass flow leaves it out."""
     if model.ground is None or not model.ground_in_mass_flow:
         return jnp.zeros(len(model.modes))
-    return mean_upflow(model, model.ground) @ ground_matrix(model, model.ground)
+    return unit_states(model).up
+
+
+class UnitStates(eqx.Module):
+    """What unit rotor states make, whatever the loading: the costly part of a model, linear, so once is enough.
+
+    sources (G, M): the ground's answer, G of c = G a. down, up (M,): area-weighted mean over the disk of their own
+    inflow and of the answer's upflow; sources and up are zero without ground.
+    """
+
+    sources: Float[Array, "G M"]
+    down: Float[Array, " M"]
+    up: Float[Array, " M"]
+
+
+def unit_states(model: FiniteStateModel) -> UnitStates:
+    """Return what unit rotor states make."""
+    down = rotor_means(model, model.ground)
+    if model.ground is None:
+        return UnitStates(jnp.zeros((len(model.sources), len(model.modes)), down.dtype), down, jnp.zeros_like(down))
+    sources = ground_matrix(model, model.ground)
+    return UnitStates(sources, down, mean_upflow(model, model.ground) @ sources)
 
 
 def mass_flow_parameters(
-    model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""] | float = 0.0
+    model: FiniteStateModel,
+    tau: Float[Array, " M"],
+    climb: Float[Array, ""] | float = 0.0,
+    unit: UnitStates | None = None,
 ) -> Float[Array, " M"]:
     """Return the diagonal of V̂ under a loading in steady climb over ΩR: V_T = V_c + u and V̄ = V_c + 2u.
 
@@ -310,9 +334,10 @@ def mass_flow_parameters(
     V̄) V_T/V̄, where q is the mean inflow of unit states, the ground's answer included. In hover the ratio is ½
     and nothing is left to solve; in climb four rounds are exact to rounding. Where the ground is left out, q τ =
     C_T/2: V and 2V with V = √(C_T/2) in hover (Eq. 4). Under a thrust that points down V_T is that of the
-    opposite one; at zero thrust it is 1e-5.
+    opposite one; at zero thrust it is 1e-5. unit: where it is at hand.
     """
-    loads = (rotor_means(model, model.ground) - answer_means(model)) * tau
+    unit = unit_states(model) if unit is None else unit
+    loads = (unit.down - unit.up if model.ground_in_mass_flow else unit.down) * tau
     first, rest = (jnp.sum(jnp.where(carried, loads, 0.0)) for carried in (~model.varying, model.varying))
     ratio = jnp.asarray(0.5)
     for _ in range(4):
@@ -323,17 +348,22 @@ def mass_flow_parameters(
 
 @eqx.filter_jit
 def steady_state(
-    model: FiniteStateModel, tau: Float[Array, " M"], climb: Float[Array, ""] | float = 0.0
+    model: FiniteStateModel,
+    tau: Float[Array, " M"],
+    climb: Float[Array, ""] | float = 0.0,
+    unit: UnitStates | None = None,
 ) -> FiniteState:
     """Return the states of a steady loading in hover or climb (over ΩR), a = V̂⁻¹τ (Eq. 3) and c = G a (Eq. 36).
 
-    tau: pressure coefficients of `model.modes`. Raises InputError where its shape differs.
+    tau: pressure coefficients of `model.modes`. unit: where it is at hand. Raises InputError where tau's shape differs.
     """
     if tau.shape != (len(model.modes),):
         raise InputError(
             f"Argument `tau` must have shape ({len(model.modes)},) as the model's modes, but has {tau.shape}"
         )
-    return with_ground(tau / mass_flow_parameters(model, tau, climb), model)
+    unit = unit_states(model) if unit is None else unit
+    a = tau / mass_flow_parameters(model, tau, climb, unit)
+    return FiniteState(a, unit.sources @ a)
 
 
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
@@ -359,6 +389,17 @@ def rotor_velocity(
     if wake is None:
         return field_functions(model.modes, points)
     return wake_flow(field_functions, model.modes, points, wake)
+
+
+def unit_inflow(
+    model: FiniteStateModel, unit: UnitStates, x: Float[Array, "*N"], y: Float[Array, "*N"]
+) -> Float[Array, "M ..."]:
+    """Return the inflow of unit rotor states at stations (x, y) of the disk, over R, with the ground's answer."""
+    down = rotor_flow(model, model.ground, x, y)
+    if model.ground is None:
+        return down
+    points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
+    return down - jnp.tensordot(unit.sources.T, ground_upflow(model, model.ground, points), 1)
 
 
 def disk_inflow(

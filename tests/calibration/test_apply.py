@@ -88,6 +88,6 @@ def test_a_study_holds_the_calibrated_model_beside_the_printed_one(solved, setti
     merged = combine(cases, settings).assign(reference_inflow=0.05)
     np.testing.assert_allclose(merged["calibrated_inflow"], merged["vpbfsm_inflow"], rtol=1e-12)
     assert "calibrated_inflow_rms_difference" in merged
-    text = report(merged, [], [], 1.0)
+    text = report(merged, [], [], {}, 1.0)
     assert "## Calibrated model" in text
     assert "calibrated: mean/ΩR" in text

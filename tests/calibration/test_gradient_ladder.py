@@ -308,11 +308,18 @@ RUNGS = [
             "model.rotor_into_ground",
             "model.mean_upflow",
             "model.rotor_means",
-            "model.answer_means",
+            "model.unit_states",
             "model.rotor_flow",
-            "model.with_ground",
         ),
         lambda v: model.inflow(model.steady_state(contracting(v), v[5:], 0.01), R, PSI[:2], contracting(v)),
+        CONTRACTING,
+    ),
+    Rung(
+        ("model.answer_means", "model.unit_inflow", "model.with_ground"),
+        lambda v: (
+            model.unit_inflow(contracting(v), model.unit_states(contracting(v)), R, 0.3 * R).T
+            @ model.with_ground(v[5:] * model.answer_means(contracting(v)), contracting(v)).a
+        ),
         CONTRACTING,
     ),
     Rung(

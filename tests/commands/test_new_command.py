@@ -1,0 +1,58 @@
+"""`rotorjax new` and `doctor`: what is written runs unchanged, and nothing is replaced."""
+
+import json
+
+import pytest
+
+from rotorjax.cli import main
+from rotorjax.commands.new import TRY
+
+
+def command(kind, folder):
+    return TRY[kind].format(folder).split()[1:]
+
+
+@pytest.mark.parametrize("kind", ["rotor", "simulate", "deck"])
+def test_what_is_written_runs_as_it_is_told(kind, tmp_path, capsys):
+    folder = tmp_path / "mine"
+    assert main(["new", kind, str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert f"try: {TRY[kind].format(folder)}" in printed
+    assert main(command(kind, folder)) == 0
+    if kind == "rotor":
+        assert "three blades: 3 blades, R = 4 m" in capsys.readouterr().out
+    else:
+        assert json.loads((folder / "out" / "report.json").read_text())["histories"]
+
+
+@pytest.mark.parametrize("kind", ["gust", "freewake"])
+def test_what_takes_longer_is_read_and_allowed(kind, tmp_path):
+    from rotorjax.simulation.case import read_case
+
+    assert main(["new", kind, str(tmp_path)]) == 0
+    case = read_case(tmp_path / "case.toml")
+    assert case.request.inflow == {"gust": "vpbfsm", "freewake": "freewake"}[kind]
+
+
+def test_every_key_of_a_rotor_file_is_shown(tmp_path):
+    from rotorjax.rotor.rotor_file import SCHEMA
+
+    assert main(["new", "rotor", str(tmp_path)]) == 0
+    text = (tmp_path / "rotor.toml").read_text()
+    missing = [key for table in SCHEMA.values() for key in table if key not in text]
+    assert not missing
+
+
+def test_nothing_is_replaced(tmp_path, capsys):
+    (tmp_path / "case.toml").write_text("mine")
+    assert main(["new", "deck", str(tmp_path)]) == 2
+    assert "case.toml: is there already and is not replaced" in capsys.readouterr().err
+    assert (tmp_path / "case.toml").read_text() == "mine"
+
+
+def test_doctor_tells_what_a_report_needs(capsys):
+    assert main(["doctor"]) == 0
+    told = capsys.readouterr().out
+    for name in ("rotorjax", "packages", "devices", "cores", "precision", "compiler"):
+        assert f"\n{name}" in f"\n{told}"
+    assert told.rstrip().endswith("right")
