@@ -20,8 +20,10 @@ from rotorjax.rotor.flap_lag import Blade, blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.rotor.moving_blade import AirLoads
-from rotorjax.wake.dynamics import WakeInputs, blade_loads, carried_on, driven
+from rotorjax.wake.dynamics import carried_on, driven
 from rotorjax.wake.field import node_velocities, undisturbed, velocity_now
+from rotorjax.wake.lifting_line import bound_line
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import Flight, FreeWake, WakeState
 from rotorjax.wake.settings import WakeSettings
 
@@ -101,9 +103,9 @@ def in_wake(state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake) 
     """Air loads of all blades, leading axis B, and the rate of the wake, per radian of Ω_ref t."""
     model = model_of(u, blades, p)
     velocities = node_velocities(model, state, blades.psi[0])
-    loads = blade_loads(model, velocities.control, state.gamma_bound, _inputs(u))
-    air = wake_air_loads(model, velocities.control, loads, blades.psi)
-    return air, carried_on(state, velocities, loads.circulation, model)
+    line = bound_line(model, velocities.control, state, _inputs(u))
+    air = wake_air_loads(model, line.control, line.loads, blades.psi)
+    return air, carried_on(state, velocities, line.gamma, model)
 
 
 def velocity_in(

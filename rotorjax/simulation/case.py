@@ -32,7 +32,7 @@ height alone and take up to 15 degrees between disk and ground, the finite-state
 import inspect
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -43,7 +43,7 @@ from rotorjax.errors import InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
 from rotorjax.simulation.history import read_history, smooth
 from rotorjax.trim.run import FREE_WAKE, INFLOWS, Request, request
-from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.settings import BoundFilter, wake_settings
 
 COLUMNS = (
     *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
@@ -86,9 +86,12 @@ SCHEMA: Schema = {
     },
     "history": {"t": Key("numbers", Range(0.0, 1e6, "s")), **{name: _column(name) for name in COLUMNS}},
     "wake": {
-        name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
-        for name, parameter in inspect.signature(wake_settings).parameters.items()
-        if name not in ("inboard", "roll_up")
+        "bound_filter": Key("text", choices=get_args(BoundFilter)),
+        **{
+            name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
+            for name, parameter in inspect.signature(wake_settings).parameters.items()
+            if name not in ("inboard", "roll_up", "bound_filter", "pair_sums")
+        },
     },
 }
 _MOST_STEPS = 200_000

@@ -86,7 +86,9 @@ def _at_instants(
 
     def one(operand):
         points, sources = operand
-        return segment_velocity(points, *sources, plane=model.ground, blades=blades)
+        return segment_velocity(
+            points, *sources, plane=model.ground, blades=blades, products=model.settings.pair_sums == "products"
+        )
 
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
