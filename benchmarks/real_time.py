@@ -158,6 +158,7 @@ def measured(name: str, library, chosen) -> dict[str, float]:
         figures["steps_per_turn"] = steps
         ms, over = against_c(library, start, precision)
         figures |= {f"rhs_ms_{name}_{short}": ms, f"rhs_over_c_{name}_{short}": over}
+    figures[f"real_time_factor_{name}_f32_two_steps"] = steps_per_second(start, chosen.turns, old_age="two steps")[0]
     if chosen.batch:
         figures[f"throughput_16_{name}_f32"] = steps_per_second(start, 1, batch=16)[0]
     if chosen.accuracy:

@@ -11,8 +11,8 @@
     duration = 3.0             # s
     steps_per_turn = 120       # optional: else 120, or 24 and more as a free wake needs
     precision = "double"       # optional, of a free wake: or "single", faster (double unless marched in real time)
-    old_age = "stage"          # optional, of a free wake: or "step", what its closure and the ground induce taken once
-                               # a step (simulation/march.py; at every stage unless marched in real time)
+    old_age = "stage"          # optional, of a free wake: or "step" or "two steps", in which what its closure and the
+                               # ground induce is summed once (simulation/march.py; "step" if marched in real time)
 
     [history]                  # optional: what is added to the trim, smooth between the points
     t = [0.0, 0.5, 0.6, 3.0]   # s
@@ -49,7 +49,7 @@ from rotorjax.trim.run import FREE_WAKE, INFLOWS, Request, request
 from rotorjax.wake.settings import BoundFilter, wake_settings
 
 Precision = Literal["single", "double"]
-OldAge = Literal["step", "stage"]
+OldAge = Literal["two steps", "step", "stage"]
 COLUMNS = (
     *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
     *("u", "v", "w", "p_deg", "q_deg", "r_deg", "rotor_speed"),
