@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 @dataclass
 class Pace:
     """Waits until a frame is due and shows it. late: frames that were not ready; frames: so far. worst: seconds by
-    which one was late.
+    which one was late. waited: seconds in all.
 
     A late frame is shown at once; the next is due when it would have been.
     """
@@ -17,6 +17,7 @@ class Pace:
     late: int = 0
     frames: int = 0
     worst: float = 0.0
+    waited: float = 0.0
     _begun: float | None = field(default=None, init=False)
 
     def start(self) -> None:
@@ -35,4 +36,5 @@ class Pace:
             self.worst = max(self.worst, -early)
         else:
             time.sleep(early)
+            self.waited += early
         self.show(f"{line}  late {self.late}")

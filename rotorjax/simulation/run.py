@@ -66,7 +66,9 @@ class Flown(NamedTuple):
 
 @dataclass(frozen=True)
 class Simulated:
-    """A flight. march_s: seconds of the march without compilation; finished, why: how it ended; pace: by the clock."""
+    """A flight. march_s: seconds of the march, without compilation and waiting; finished, why: how it ended; pace: by
+    the clock.
+    """
 
     case: SimulationCase
     start: Start
@@ -146,7 +148,7 @@ def fly_from(
     begun = time.perf_counter()
     watched = progress is not None and isinstance(p, CoupledWake) and pace is None
     found = marched(steps // (per_turn // SAVES), case.duration * omega, watched)
-    spent = time.perf_counter() - begun
+    spent = time.perf_counter() - begun - (0.0 if pace is None else pace.waited)
     report("outputs")
     u, y = _outputs(found.t, found.x, driver, p)
     return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why, pace)
