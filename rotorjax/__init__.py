@@ -22,6 +22,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "performance": "rotorjax.api.solved",
     "linearise": "rotorjax.api.applications",
     "simulate": "rotorjax.api.applications",
+    "march": "rotorjax.api.applications",
     "calibrate": "rotorjax.api.applications",
     "InputError": "rotorjax.errors",
     "plane": "rotorjax.ground",

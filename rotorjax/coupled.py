@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
-from rotorjax.coupled_wake import BladesAt, CoupledWake, in_wake, velocity_in
+from rotorjax.coupled_wake import BladesAt, CoupledWake, in_wake, old_in, velocity_in
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.inflow.interface import DiskLoads, InflowModel
 from rotorjax.operating import OperatingPoint
@@ -119,11 +119,18 @@ def output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled) -> 
     return rate_and_output(t, x, u, p)[1]
 
 
-def rate_and_output(t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled) -> tuple[CoupledState, Outputs]:
-    """Both from one evaluation of the blades."""
+def rate_and_output(
+    t: Float[Array, ""], x: CoupledState, u: RotorInputs, p: Coupled, old: Float[Array, "B N 3"] | None = None
+) -> tuple[CoupledState, Outputs]:
+    """Both from one evaluation of the blades; old: `old_induced` of a free wake, if it is known."""
     del t
-    found = _evaluate(x, u, p)
+    found = _evaluate(x, u, p, old)
     return _rate(found, x, u), _output(found, u, p)
+
+
+def old_induced(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Float[Array, "B N 3"]:
+    """What closure and ground of a free wake induce at its nodes, seen from the blades: it changes slowly."""
+    return old_in(x.inflow, u, blades_at(x, u, p), p)
 
 
 def _rate(found: _Evaluation, x: CoupledState, u: RotorInputs) -> CoupledState:
@@ -196,12 +203,12 @@ def _pitch(psi: Float[Array, " B"], q: Float[Array, "B 2"], u: RotorInputs, p: C
     return pitch(u, psi) - p.blade.coupling * (q[:, 0] - p.blade.precone)
 
 
-def _evaluate(x: CoupledState, u: RotorInputs, p: Coupled) -> _Evaluation:
+def _evaluate(x: CoupledState, u: RotorInputs, p: Coupled, old: Float[Array, "B N 3"] | None = None) -> _Evaluation:
     psi, q, q_dot = _angles(x, u, p)
     frames = jax.vmap(lambda psi: turning_frame(u, psi, p.blade.gravity))(psi)
     theta = _pitch(psi, q, u, p)
     if isinstance(p, CoupledWake):
-        air, inflow = in_wake(x.inflow, u, blades_at(x, u, p), p)
+        air, inflow = in_wake(x.inflow, u, blades_at(x, u, p), p, old)
     else:
         air, inflow = _in_inflow(x.inflow, u, p, psi, frames, q, q_dot, theta)
     q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)

@@ -20,8 +20,10 @@ from rotorjax.rotor.flap_lag import Blade, blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.rotor.moving_blade import AirLoads
-from rotorjax.wake.dynamics import WakeInputs, blade_loads, carried_on, driven
-from rotorjax.wake.field import node_velocities, undisturbed, velocity_now
+from rotorjax.wake.dynamics import carried_on, driven
+from rotorjax.wake.field import node_velocities, old_velocities, undisturbed, velocity_now
+from rotorjax.wake.lifting_line import bound_line
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import Flight, FreeWake, WakeState
 from rotorjax.wake.settings import WakeSettings
 
@@ -97,13 +99,23 @@ def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
     return driven(model, _inputs(u))
 
 
-def in_wake(state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake) -> tuple[AirLoads, WakeState]:
-    """Air loads of all blades, leading axis B, and the rate of the wake, per radian of Ω_ref t."""
+def in_wake(
+    state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake, old: Float[Array, "B N 3"] | None = None
+) -> tuple[AirLoads, WakeState]:
+    """Air loads of all blades, leading axis B, and the rate of the wake, per radian of Ω_ref t.
+
+    old: what closure and ground induce at all nodes (`wake.field.old_velocities`), None to sum it up here.
+    """
     model = model_of(u, blades, p)
-    velocities = node_velocities(model, state, blades.psi[0])
-    loads = blade_loads(model, velocities.control, state.gamma_bound, _inputs(u))
-    air = wake_air_loads(model, velocities.control, loads, blades.psi)
-    return air, carried_on(state, velocities, loads.circulation, model)
+    velocities = node_velocities(model, state, blades.psi[0], old)
+    line = bound_line(model, velocities.control, state, _inputs(u))
+    air = wake_air_loads(model, line.control, line.loads, blades.psi)
+    return air, carried_on(state, velocities, line.gamma, model)
+
+
+def old_in(state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake) -> Float[Array, "B N 3"]:
+    """What closure and ground induce at all nodes, for `in_wake`."""
+    return old_velocities(model_of(u, blades, p), state, blades.psi[0])
 
 
 def velocity_in(

@@ -129,6 +129,7 @@ BAD = {
     "inflow --rotor {tmp}/zero.toml": "zero.toml: the path must be a file, but is a device",
     "inflow --calibration {tmp}/pipe.toml": "but is a pipe",
     "simulate --case {tmp}/zero.toml --out {tmp}/out": "but is a device",
+    "simulate --case {tmp}/flight.toml --out {tmp}/out --real-time": 'must come with inflow = "freewake"',
     "deck --case {tmp}/pipe.toml --out {tmp}/out": "but is a pipe",
     "unknown": "unknown",
     "": "COMMAND",
@@ -142,6 +143,7 @@ def test_bad_input_is_one_line_and_exit_code_2(line, tmp_path, capsys):
     (tmp_path / "zero.toml").symlink_to("/dev/zero")
     (tmp_path / "misspelt.toml").write_text(ROTOR.replace("radius", "radus"))
     (tmp_path / "gap.toml").write_text(ROTOR)
+    (tmp_path / "flight.toml").write_text("[flight]\nthrust_coefficient = 0.006\n[time]\nduration = 1.0\n")
     (tmp_path / "gap.csv").write_text("alpha_deg,cl,cd\n-180,0,0\n0,,0.01\n180,0,0\n")
     try:
         code = main(line.format(tmp=tmp_path).split())

@@ -8,8 +8,8 @@ import numpy as np
 from rotorjax.coupled_wake import wake_air_loads
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.rotor.catalogue import load
-from rotorjax.wake.dynamics import across_blades
 from rotorjax.wake.equilibrium import Unknowns, evaluated, spread
+from rotorjax.wake.loads import across_blades
 from rotorjax.wake.model import Flight, free_wake, on_blade
 from rotorjax.wake.settings import flight_settings
 from rotorjax.wake.start import prescribed

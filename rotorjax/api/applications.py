@@ -12,6 +12,7 @@ from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
     from rotorjax.ode.models import LinearModel, PeriodicModel
+    from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
     from rotorjax.trim.run import Result
 
@@ -79,6 +80,23 @@ def simulate(case: str | Path, progress: Callable[[str], None] | None = None) ->
     from rotorjax.simulation.run import fly
 
     return fly(read_case(case), progress)
+
+
+def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) -> "March":
+    """Compile a march of a trim with any inflow, to be stepped inside a simulator's loop at a fixed cost.
+
+    steps_per_turn: of a revolution, None for what the inflow needs. options: of `simulation.march.march`: precision,
+    old_age, batch, bound_filter. Raises InputError where the steps are too few, with the number that is enough.
+
+    >>> import rotorjax as rj
+    >>> level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", advance=0.15)
+    >>> marched = rj.march(level)
+    >>> bool(marched.step(marched.start).y.CT > 0.005)
+    True
+    """
+    from rotorjax.simulation.march import march
+
+    return march(trimmed, steps_per_turn, **options)
 
 
 def calibrate(target: str, *data: Any, **settings: Any) -> Any:

@@ -17,6 +17,12 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
     parser.add_argument("--gif", action="store_true", help="write the animation too")
+    parser.add_argument(
+        "--real-time",
+        action="store_true",
+        help="march a free wake by the clock, in single precision unless the case says otherwise: a line for each "
+        "twelfth of a revolution, late ones counted",
+    )
     parser.set_defaults(run=run)
 
 
@@ -25,16 +31,22 @@ def run(chosen: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     from rotorjax.commands.arguments import introduce
+    from rotorjax.errors import InputError
     from rotorjax.io.atomic import make_folder
     from rotorjax.simulation.case import read_case
     from rotorjax.simulation.files import write_all
+    from rotorjax.simulation.pace import Pace
     from rotorjax.simulation.run import fly
+    from rotorjax.trim.run import FREE_WAKE
 
     case = read_case(chosen.case)
+    if chosen.real_time and case.request.inflow != FREE_WAKE:
+        raise InputError(f'Argument `--real-time` must come with inflow = "{FREE_WAKE}", but: {case.request.inflow}')
     out = make_folder(chosen.out)
+    pace = Pace(print) if chosen.real_time else None
     introduce(case.request.rotor, case.request.operating, moves=True)
     with tqdm(desc="simulate", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
-        found = fly(case, bar.set_postfix_str)
+        found = fly(case, bar.set_postfix_str, pace)
         bar.set_postfix_str("files")
         told = write_all(found, out, animated=chosen.gif)
     for name, row in told["histories"].items():
@@ -44,6 +56,8 @@ def run(chosen: argparse.Namespace) -> int:
         f"({told['march_s_per_revolution']:.3f} s a revolution, {told['real_time_factor']:.2f} times real time): "
         f"{out / 'report.json'}"
     )
+    if pace is not None:
+        print(f"{pace.late} of {pace.frames} frames late, by up to {1e3 * pace.worst:.0f} ms")
     if "wake_change_last" in told:
         last, most = told["wake_change_last"], told["wake_change_max"]
         print(f"wake nodes moved over the last revolution by {last:.2e} R (rms), over any by up to {most:.2e} R")

@@ -16,9 +16,10 @@ from jaxtyping import Array, Complex, Float
 
 from rotorjax.errors import InputError
 from rotorjax.linearisation.outputs import WakeOutputs, read
-from rotorjax.wake.dynamics import WakeInputs, driven, inputs_of, rates
+from rotorjax.wake.dynamics import driven, inputs_of, rates
 from rotorjax.wake.field import Velocities, node_velocities
 from rotorjax.wake.influence import velocity_response
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import FreeWake, WakeState, slices
 from rotorjax.wake.solution import Solution
 

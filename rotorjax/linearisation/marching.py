@@ -13,7 +13,8 @@ from rotorjax.linearisation.assembly import velocities_along
 from rotorjax.linearisation.outputs import WakeOutputs, read
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.trajectory import march
-from rotorjax.wake.dynamics import WakeInputs, driven, inputs_of, rhs
+from rotorjax.wake.dynamics import driven, inputs_of, rhs
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import FreeWake, WakeState, slices
 from rotorjax.wake.solution import Solution
 

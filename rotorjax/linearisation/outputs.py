@@ -6,9 +6,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.wake.dynamics import WakeInputs, blade_loads, driven
+from rotorjax.wake.dynamics import driven
 from rotorjax.wake.equilibrium import Evaluation
 from rotorjax.wake.field import Velocities, node_velocities
+from rotorjax.wake.loads import WakeInputs, blade_loads
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.performance import performance
 from rotorjax.wake.segments import releases

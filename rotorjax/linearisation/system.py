@@ -28,7 +28,8 @@ from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import Orbit, make_orbit
 from rotorjax.ode.outcome import Outcome, relative_rms
-from rotorjax.wake.dynamics import WakeInputs, inputs_of, rhs
+from rotorjax.wake.dynamics import inputs_of, rhs
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
 from rotorjax.wake.solution import Solution
 

@@ -126,6 +126,13 @@ def step(rhs: Rhs, t: ArrayLike, x: PyTree, dt: ArrayLike, *args: Any, tableau: 
 
     Raises InputError where `rhs` returns something that is not shaped like `x`.
     """
+    return told_step(lambda *at: (rhs(*at), ()), t, x, dt, *args, tableau=tableau)[0]
+
+
+def told_step(
+    rhs: Rhs, t: ArrayLike, x: PyTree, dt: ArrayLike, *args: Any, tableau: ButcherTableau = RK5
+) -> tuple[PyTree, PyTree]:
+    """`step` with an rhs that returns (rate, anything): the state after it, and anything at its start."""
     stages = tableau.stages
     lower = [[float(v) for v in row] + [0.0] * (stages - i) for i, row in enumerate(tableau.a)]
 
@@ -135,14 +142,14 @@ def step(rhs: Rhs, t: ArrayLike, x: PyTree, dt: ArrayLike, *args: Any, tableau: 
 
         return jax.tree.map(leaf, x, k)
 
-    def stage(k: PyTree, row: tuple[Array, Array, Array]) -> tuple[PyTree, None]:
+    def stage(k: PyTree, row: tuple[Array, Array, Array]) -> tuple[PyTree, PyTree]:
         i, weights, c = row
-        slope = rhs(t + c * dt, combine(weights, k), *args)
+        slope, told = rhs(t + c * dt, combine(weights, k), *args)
         require_like(slope, x, "rhs(t, x, ...)")
-        return jax.tree.map(lambda ks, s: ks.at[i].set(s), k, slope), None
+        return jax.tree.map(lambda ks, s: ks.at[i].set(s), k, slope), told
 
     time = jnp.result_type(t, dt, float)
     rows = (jnp.arange(stages), jnp.array(lower), jnp.array([float(c) for c in tableau.c], time))
     empty = jax.tree.map(lambda y: jnp.zeros((stages, *jnp.shape(y)), jnp.result_type(y)), x)
-    slopes, _ = jax.lax.scan(stage, empty, rows)
-    return combine(jnp.array([float(b) for b in tableau.b]), slopes)
+    slopes, told = jax.lax.scan(stage, empty, rows)
+    return combine(jnp.array([float(b) for b in tableau.b]), slopes), jax.tree.map(lambda v: v[0], told)

@@ -112,6 +112,15 @@ def section_loads(
     )
 
 
+def attached_slope(rotor: Rotor, operating: OperatingPoint, speed: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """Lift slope (per rad) of sections at zero angle, at speeds over ΩR: that of `section_loads` where the angle varies
+    from panel to panel and the mean along the span is kept.
+    """
+    mach = speed * operating.tip_mach(rotor.radius)
+    nothing = jnp.zeros_like(mach)
+    return jax.jvp(lambda alpha: lift_drag(rotor.airfoil, alpha, mach)[0], (nothing,), (jnp.ones_like(mach),))[1]
+
+
 def span_averages(r: Float[Array, " R"], widths: Float[Array, " R"], length: Float[Array, " R"]) -> Float[Array, "R R"]:
     """Matrix that takes a Gaussian mean along the span about each section; all lengths over R.
 

@@ -9,7 +9,10 @@
 
     [time]
     duration = 3.0             # s
-    steps_per_turn = 120       # optional: else 120, or what a free wake needs
+    steps_per_turn = 120       # optional: else 120, or 24 and more as a free wake needs
+    precision = "double"       # optional, of a free wake: or "single", faster (double unless marched in real time)
+    old_age = "stage"          # optional, of a free wake: or "step" or "two steps", in which what its closure and the
+                               # ground induce is summed once (simulation/march.py; "step" if marched in real time)
 
     [history]                  # optional: what is added to the trim, smooth between the points
     t = [0.0, 0.5, 0.6, 3.0]   # s
@@ -32,7 +35,7 @@ height alone and take up to 15 degrees between disk and ground, the finite-state
 import inspect
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -43,8 +46,10 @@ from rotorjax.errors import InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
 from rotorjax.simulation.history import read_history, smooth
 from rotorjax.trim.run import FREE_WAKE, INFLOWS, Request, request
-from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.settings import BoundFilter, wake_settings
 
+Precision = Literal["single", "double"]
+OldAge = Literal["two steps", "step", "stage"]
 COLUMNS = (
     *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
     *("u", "v", "w", "p_deg", "q_deg", "r_deg", "rotor_speed"),
@@ -83,14 +88,20 @@ SCHEMA: Schema = {
     "time": {
         "duration": Key("number", Range(1e-3, 1e5, "s"), required=True),
         "steps_per_turn": Key("whole number", Range(24, 1440)),
+        "precision": Key("text", choices=get_args(Precision)),
+        "old_age": Key("text", choices=get_args(OldAge)),
     },
     "history": {"t": Key("numbers", Range(0.0, 1e6, "s")), **{name: _column(name) for name in COLUMNS}},
     "wake": {
-        name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
-        for name, parameter in inspect.signature(wake_settings).parameters.items()
-        if name not in ("inboard", "roll_up")
+        "bound_filter": Key("text", choices=get_args(BoundFilter)),
+        **{
+            name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
+            for name, parameter in inspect.signature(wake_settings).parameters.items()
+            if name not in ("inboard", "roll_up", "bound_filter", "pair_sums")
+        },
     },
 }
+_OF_A_WAKE = ("precision", "old_age")
 _MOST_STEPS = 200_000
 
 
@@ -98,7 +109,7 @@ _MOST_STEPS = 200_000
 class SimulationCase:
     """One flight. request: the trim that it starts from. duration (s). steps_per_turn. t (P,) in s, columns (P, 10):
     what is added to the trim, in the file's units and the order of COLUMNS; rotor_speed is what it is. wake: settings
-    of the free wake other than the trim's own.
+    of the free wake other than the trim's own. precision, old_age: of a free wake's march, None for the usual.
     """
 
     request: Request
@@ -107,6 +118,8 @@ class SimulationCase:
     t: Float[np.ndarray, " P"]
     columns: Float[np.ndarray, "P C"]
     wake: dict[str, Any] = field(default_factory=dict)
+    precision: Precision | None = None
+    old_age: OldAge | None = None
 
     def polynomials(self) -> PPoly:
         """Smooth histories over time in s."""
@@ -131,7 +144,8 @@ def _build(data: Tables, folder: Path) -> SimulationCase:
     t, columns = read_history(history, COLUMNS, duration)
     if "rotor_speed" not in history:
         columns[:, -1] = 100.0
-    case = SimulationCase(_request(data["flight"], folder), duration, steps, t, columns, dict(data.get("wake", {})))
+    wake, marched = dict(data.get("wake", {})), {name: times.get(name) for name in _OF_A_WAKE}
+    case = SimulationCase(_request(data["flight"], folder), duration, steps, t, columns, wake, **marched)
     _check_model(case)
     return case
 
@@ -148,6 +162,10 @@ def _check_model(case: SimulationCase) -> None:
     if request.inflow != FREE_WAKE:
         if case.wake:
             raise InputError(f'[wake] must come with inflow = "{FREE_WAKE}" in [flight], but it is "{request.inflow}"')
+        if given := [name for name in _OF_A_WAKE if getattr(case, name) is not None]:
+            raise InputError(
+                f'[time] {given[0]} must come with inflow = "{FREE_WAKE}" in [flight], but it is "{request.inflow}"'
+            )
         return
     wake_settings(**case.wake)
     if request.height is not None and request.slope_deg and request.advance:

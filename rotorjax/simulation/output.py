@@ -119,6 +119,7 @@ def report(found: Simulated, data: xr.Dataset) -> dict[str, Any]:
         "march_s": found.march_s,
         "march_s_per_revolution": found.march_s / turns,
         "real_time_factor": flown_s / found.march_s,
+        **({} if found.pace is None else {"frames": found.pace.frames, "late_frames": found.pace.late}),
         "vortex_ring_s": vortex_ring(found, data["time"].values),
         **_of_the_wake(data),
         "histories": {

@@ -1,8 +1,10 @@
 """Marching a flight from its trim, with the histories added to the trim's inputs."""
 
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -11,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy.interpolate import PPoly
+from tqdm import tqdm
 
 from rotorjax.coupled import Coupled, CoupledState, Outputs, output, rhs
 from rotorjax.coupled_wake import CoupledWake
@@ -18,8 +21,10 @@ from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import ATTITUDE, RotorInputs
-from rotorjax.simulation.case import SimulationCase, steps_of
+from rotorjax.simulation.case import OldAge, Precision, SimulationCase, steps_of
 from rotorjax.simulation.history import Piecewise, piecewise
+from rotorjax.simulation.march import MarchState, begun, cast, compiled, on_device, precision_of, stretch
+from rotorjax.simulation.pace import Pace
 from rotorjax.simulation.path import Above, angles, hub_path
 from rotorjax.simulation.start import Start, start_of
 from rotorjax.simulation.step import instant, steps_per_turn
@@ -61,7 +66,9 @@ class Flown(NamedTuple):
 
 @dataclass(frozen=True)
 class Simulated:
-    """A flight. march_s: seconds of the march without compilation; finished, why: how it ended."""
+    """A flight. march_s: seconds of the march, without compilation and waiting; finished, why: how it ended; pace: by
+    the clock.
+    """
 
     case: SimulationCase
     start: Start
@@ -71,6 +78,7 @@ class Simulated:
     march_s: float
     finished: bool
     why: str
+    pace: Pace | None = None
 
 
 def driven(t: Float[Array, ""], x: CoupledState, driver: Driver, p: Coupled) -> CoupledState:
@@ -108,52 +116,128 @@ def path_of(case: SimulationCase, rotor: Rotor, operating: OperatingPoint, tilt:
     return hub_path(motion, velocity, -tilt, case.duration * omega, ground)
 
 
-def fly(case: SimulationCase, progress: Progress | None = None) -> Simulated:
-    """Trim, check the path and march. Raises InputError where the case cannot be flown or does not trim."""
+def fly(case: SimulationCase, progress: Progress | None = None, pace: Pace | None = None) -> Simulated:
+    """Trim, check the path and march, by the clock with a pace. Raises InputError where the case cannot be flown or
+    does not trim.
+    """
     report = progress or (lambda stage: None)
     request = case.request
     if request.height is not None and request.drag_area is None:  # said before the trim's work
         path_of(case, request.rotor, request.operating, float(np.deg2rad(request.tilt_deg)))
     report("trim")
-    return fly_from(case, start_of(case, report), report)
+    return fly_from(case, start_of(case, report), report, pace)
 
 
-def fly_from(case: SimulationCase, start: Start, progress: Progress | None = None) -> Simulated:
-    """March from a start. Raises InputError where the hub's path takes the disk into the ground."""
+def fly_from(
+    case: SimulationCase, start: Start, progress: Progress | None = None, pace: Pace | None = None
+) -> Simulated:
+    """March from a start. Raises InputError where the hub's path takes the disk into the ground.
+
+    Warns of a history that changes faster than the steps.
+    """
     report = progress or (lambda stage: None)
     driver, p = driver_of(case, start), start.p
     omega = float(p.operating.omega)
     per_turn = steps_per_turn(case, start)
     steps = steps_of(case, omega, per_turn)
+    check_histories(case, 2 * np.pi / per_turn / omega)
     report("compile the march")
-    _marched(driver, start, per_turn // SAVES, per_turn, 2 * np.pi / SAVES)
+    make = _marcher_of_wake if isinstance(p, CoupledWake) else _marcher
+    marched = make(case, driver, start, per_turn, pace)
     report("march")
     begun = time.perf_counter()
-    watched = progress is not None and isinstance(p, CoupledWake)
-    found = _marched(driver, start, steps, per_turn, case.duration * omega, watched)
-    jax.block_until_ready(found.x)
-    spent = time.perf_counter() - begun
+    watched = progress is not None and isinstance(p, CoupledWake) and pace is None
+    found = marched(steps // (per_turn // SAVES), case.duration * omega, watched)
+    spent = time.perf_counter() - begun - (0.0 if pace is None else pace.waited)
     report("outputs")
     u, y = _outputs(found.t, found.x, driver, p)
-    return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why)
+    return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why, pace)
 
 
-def _marched(driver: Driver, start: Start, steps: int, per_turn: int, end: float, watched: bool = False) -> Trajectory:
-    """March to Ω_ref t = end, saving each twelfth of a revolution and the end, before which the steps are shorter."""
+def check_histories(case: SimulationCase, step: float) -> None:
+    """Warn where points of a history stand closer than the steps (s), and say what they are taken for."""
+    moving = np.any(np.diff(case.columns, axis=0) != 0, axis=1)
+    gaps = np.diff(case.t)[moving]
+    if not gaps.size or gaps.min() >= step:
+        return
+    k = int(np.flatnonzero(moving)[np.argmin(gaps)])
+    most = 0.5 / step
+    warnings.warn(
+        f"[history] changes between t = {case.t[k]:g} and {case.t[k + 1]:g} s, in less than a step of {step:.3g} s: "
+        f"what is faster than {most:.3g} Hz is taken for something slower (f for |f - {2 * most:.3g}|): "
+        "raise steps_per_turn in [time]",
+        stacklevel=3,
+    )
+
+
+Marcher = Callable[[int, float, bool], Trajectory]
+"""Marches so many stretches, each of a twelfth of a revolution but for the last and shorter one, to an Ω_ref t; watched
+or not. Keeps the ends of the stretches.
+"""
+
+
+def _marcher(case: SimulationCase, driver: Driver, start: Start, per_turn: int, pace: Pace | None) -> Marcher:
+    """March with an inflow model, compiled by a march of one stretch."""
     every, dt = per_turn // SAVES, 2 * np.pi / per_turn
 
-    def go(x: CoupledState, t: float, dt: float, count: int) -> Trajectory:
-        return march(driven, x, t, dt, count, driver, start.p, save_every=every, progress=watched)
+    def go(x: CoupledState, t: float, dt: float, stretches: int, watched: bool = False) -> Trajectory:
+        return march(driven, x, t, dt, stretches * every, driver, start.p, save_every=every, progress=watched)
 
-    if steps == every:
-        return go(start.x, 0.0, end / every, every)
-    whole = go(start.x, 0.0, dt, steps - every)
-    if not whole.finished:
-        return whole
-    t = (steps - every) * dt
-    last = go(whole.last, t, (end - t) / every, every)
-    t, x = jax.tree.map(lambda a, b: jnp.concatenate([a, b[1:]]), (whole.t, whole.x), (last.t, last.x))
-    return Trajectory(t, x, last.finished, last.why)
+    def marched(stretches: int, end: float, watched: bool) -> Trajectory:
+        if stretches == 1:
+            return jax.block_until_ready(go(start.x, 0.0, end / every, 1))
+        whole = go(start.x, 0.0, dt, stretches - 1, watched)
+        if not whole.finished:
+            return whole
+        t = (stretches - 1) * every * dt
+        last = go(whole.last, t, (end - t) / every, 1)
+        t, x = jax.tree.map(lambda a, b: jnp.concatenate([a, b[1:]]), (whole.t, whole.x), (last.t, last.x))
+        return jax.block_until_ready(Trajectory(t, x, last.finished, last.why))
+
+    go(start.x, 0.0, dt, 1)
+    return marched
+
+
+def _marcher_of_wake(case: SimulationCase, driver: Driver, start: Start, per_turn: int, pace: Pace | None) -> Marcher:
+    """March with a free wake (simulation/march.py), frame by frame by the clock where there is a pace."""
+    every, stretch_of = per_turn // SAVES, 2 * np.pi / SAVES
+    precision: Precision = case.precision or ("double" if pace is None else "single")
+    old_age: OldAge = case.old_age or ("stage" if pace is None else "step")
+    omega = float(start.p.operating.omega)
+    with precision_of(precision):
+        x, u, drive, p = on_device(cast((start.x, start.inputs, driver, start.p), precision))
+        first, number = begun(x, u, p, old_age), jnp.zeros(())
+        program = compiled(partial(stretch, every), first, number, number, drive, p)
+
+    def marched(stretches: int, end: float, watched: bool) -> Trajectory:
+        ends = np.append(stretch_of * np.arange(stretches), end)
+        state, states, why = first, [jax.device_get(start.x)], ""
+        if pace is not None:
+            pace.start()
+        try:
+            for k in tqdm(range(stretches), desc="march", disable=not watched):
+                t, dt = cast((float(ends[k]), float(ends[k + 1] - ends[k]) / every), precision)
+                state = jax.block_until_ready(program(state, t, dt, drive, p))
+                if not bool(state.finite):
+                    why = f"not finite before Ω t = {ends[k + 1]:.3f}: what it had before is kept"
+                    break
+                states.append(jax.device_get(state.x))
+                if pace is not None:
+                    pace.frame(ends[k + 1] / omega, _line(ends[k + 1] / omega, state))
+        except KeyboardInterrupt:
+            why = f"interrupted after {len(states) - 1} stretches"
+        x = jax.tree.map(lambda *v: jnp.asarray(np.stack(v), float), *states)
+        x = eqx.tree_at(lambda x: x.psi, x, jnp.unwrap(x.psi))
+        return Trajectory(jnp.asarray(ends[: len(states)]), x, not why, why or "finished")
+
+    return marched
+
+
+def _line(t: float, state: MarchState) -> str:
+    """A frame in words: the loads are those of the last step's start."""
+    flap = np.rad2deg(np.asarray(state.x.rotor.flap[:3]))
+    told = "  ".join(f"{v:+7.3f}" for v in flap)
+    return f"{t:9.3f} s  psi {np.rad2deg(float(state.x.psi)):5.1f}  CT {float(state.y.CT):.5f}  flap {told} deg"
 
 
 def _outputs(t: Float[Array, " T"], x: CoupledState, driver: Driver, p: Coupled) -> tuple[RotorInputs, Outputs]:

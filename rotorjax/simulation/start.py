@@ -17,7 +17,7 @@ from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import SimulationCase
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.problem import inputs_at
-from rotorjax.trim.run import FREE_WAKE, run
+from rotorjax.trim.run import FREE_WAKE, Result, run
 from rotorjax.trim.solve import Trimmed
 from rotorjax.wake.equilibrium import full_state
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
@@ -46,20 +46,25 @@ def start_of(case: SimulationCase, progress: Callable[[str], None] | None = None
             progress(f"{stage}, residual {residual:.1e}")
 
     wake = settings_of(case) if case.request.inflow == FREE_WAKE else None
-    result = run(replace(case.request, wake=wake), progress=show)
-    found = result.trimmed
-    if not found.outcome.converged:
-        raise InputError(f"[flight] must be a flight that can be trimmed, but: {found.outcome.why}")
-    start = from_wake(found) if isinstance(found, TrimmedInWake) else from_trim(found)
-    return replace(start, CT=result.means.CT, CQ=result.means.CQ)
+    return from_result(run(replace(case.request, wake=wake), progress=show))
 
 
 def settings_of(case: SimulationCase) -> WakeSettings:
     """Settings of the free wake: those of its trim, with what the case has of its own. Raises InputError as they do."""
     blades = case.request.rotor.blades
+    chosen = {"bound_filter": "solution", "pair_sums": "products", **case.wake}
     if case.request.advance:
-        return flight_settings(blades, **case.wake)
-    return wake_settings(**{"azimuths": 2 * blades, **case.wake})
+        return flight_settings(blades, **chosen)
+    return wake_settings(**{"azimuths": 2 * blades, **chosen})
+
+
+def from_result(result: Result) -> Start:
+    """Start from a trim. Raises InputError where it has not converged."""
+    found = result.trimmed
+    if not found.outcome.converged:
+        raise InputError(f"[flight] must be a flight that can be trimmed, but: {found.outcome.why}")
+    start = from_wake(found) if isinstance(found, TrimmedInWake) else from_trim(found)
+    return replace(start, CT=result.means.CT, CQ=result.means.CQ)
 
 
 def from_trim(trimmed: Trimmed) -> Start:

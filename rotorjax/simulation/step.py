@@ -15,8 +15,8 @@ from rotorjax.simulation.start import Start
 
 USUAL = 120
 """Steps of a revolution without a free wake."""
-STABLE = 3.0
-"""|λ|Δψ of the fastest decay; the method holds 3.3 on the negative real axis."""
+STABLE = 2.75
+"""|λ|Δψ of the fastest decay; the classical Runge-Kutta method holds 2.785 on the negative real axis."""
 
 
 @eqx.filter_jit
@@ -31,25 +31,35 @@ def steps_per_turn(case: SimulationCase, start: Start) -> int:
     Raises InputError where the case's are too few for its free wake, whose march would leave the finite numbers.
     """
     wanted = case.steps_per_turn
-    if not isinstance(start.p, CoupledWake):
-        return wanted or USUAL
-    decay = fastest_decay(start.x, start.inputs, start.p)
-    least = 12 * int(np.ceil(2 * np.pi * decay / STABLE / 12))
     if wanted is None:
-        return least
-    if wanted < least:
-        raise InputError(
-            f"[time] steps_per_turn must be at least {least} for this wake, whose bound circulation decays by "
-            f"{decay:.0f} per radian, but is {wanted}: leave it out, or raise circulation_lag in [wake]"
-        )
+        return usual_steps(start)
+    if wanted < (least := least_steps(start)):
+        raise InputError(f"[time] steps_per_turn must be at least {least} for this wake, but is {wanted}: leave it out")
     return wanted
+
+
+def usual_steps(start: Start) -> int:
+    """Steps of a revolution where nobody asks for a number: a multiple of twelve."""
+    return max(24, least_steps(start)) if isinstance(start.p, CoupledWake) else USUAL
+
+
+def least_steps(start: Start) -> int:
+    """Least steps of a revolution with which a free wake can be marched, a multiple of twelve; 1 without one.
+
+    Its transport along age allows one age step (5PBU4 with the classical Runge-Kutta method: 1.044), its bound
+    circulation STABLE over its fastest decay.
+    """
+    if not isinstance(start.p, CoupledWake):
+        return 1
+    decay = fastest_decay(start.x, start.inputs, start.p)
+    return 12 * int(np.ceil(max(2 * np.pi * decay / STABLE, start.p.settings.steps_per_turn) / 12 - 1e-9))
 
 
 def fastest_decay(x: CoupledState, u: RotorInputs, p: CoupledWake, rounds: int = 24) -> float:
     """Largest |λ| of the bound circulation's rate (per radian), by power iteration on its differences.
 
-    It is the stiff part of the system: on narrow panels at the tip the circulation follows its own downwash, many times
-    faster than the filter's time constant.
+    It may be the stiff part of the system: on narrow panels at the tip the paper's filter follows its own downwash,
+    many times faster than its time constant (wake/lifting_line.py).
     """
 
     def rate(gamma: Float[Array, "B R"]) -> np.ndarray:

@@ -45,7 +45,8 @@ from rotorjax.potential.ground_table import ground_table
 from rotorjax.potential.model import finite_state_model
 from rotorjax.potential.moving_ground import Variant, still
 from rotorjax.potential.wake_transport import wake_transport
-from rotorjax.wake.dynamics import WakeInputs, driven, inputs_of, rhs
+from rotorjax.wake.dynamics import driven, inputs_of, rhs
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.solution import Solution
 

@@ -17,8 +17,9 @@ from jaxtyping import Array, Float
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.outcome import ravelled, traceable, unravelled
 from rotorjax.rotor.blade_element import SectionLoads
-from rotorjax.wake.dynamics import blade_loads, inputs_of, leading_lines, operators
+from rotorjax.wake.dynamics import inputs_of, leading_lines, operators
 from rotorjax.wake.field import Velocities, node_velocities
+from rotorjax.wake.loads import blade_loads
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.roll_up import Release, release
 from rotorjax.wake.transport import lag, solve_nodes, solve_scalar

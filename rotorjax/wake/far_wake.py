@@ -21,6 +21,10 @@ jet of radius a, about z = a²/2r near the plane, dz/ds is 0.66 at a height of 0
 HIGH = 20.0
 """Where sinh x is e^x/2 to rounding."""
 
+FARTHEST = {4: 1e4, 8: 1e30}
+"""How much wider than the last free turn, by bytes of a number, the closure over ground gets: the eighth power of a
+distance must not overflow. What lies there induces nothing."""
+
 LEAST = 0.005
 """Height over R that a turn's mean does not fall below: a search may put it under the plane."""
 
@@ -88,6 +92,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     # what ln sinh x falls by in a turn is the same for every turn
     mean, mean_before = jnp.mean(x, axis=1), jnp.mean(_heights(before, normal, plane), axis=1) / REACH
     fall = after * (_log_sinh(mean_before) - _log_sinh(mean))[:, None, None]
+    fall = jnp.minimum(fall, 2 * np.log(FARTHEST[fall.dtype.itemsize]))
     lower = _lowered(x[:, None], fall)
     wider = jnp.exp(0.5 * (fall + _log_cosh(lower) - _log_cosh(x)[:, None]))
     downhill = normal - np.array([0.0, 0.0, 1.0]) / normal[2]

@@ -1,5 +1,6 @@
 """Velocities that the wake induces: at its own nodes, on the blades, anywhere."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -11,7 +12,16 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
-from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
+from rotorjax.wake.segments import (
+    Part,
+    Segments,
+    bound_vortex,
+    far_filaments,
+    join,
+    lattice_segments,
+    near_lattice,
+    releases,
+)
 
 
 class Velocities(NamedTuple):
@@ -22,34 +32,89 @@ class Velocities(NamedTuple):
     far: Float[Array, "K F AF 3"]
 
 
-def wake_segments(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Segments:
-    """All segments of every slice, each in its blade's frame: fields (K, S, …)."""
+def wake_segments(
+    model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0, part: Part = "all"
+) -> Segments:
+    """All segments of every slice, or those without ("free") or of the closure alone ("old"), each in its blade's
+    frame: fields (K, S, …).
+    """
 
     def one(slice_, angle, k):
         own = model.of_slice(k)
+        far = far_filaments(own, slice_, releases(own, slice_), angle, part)
+        if part == "old":
+            return far
         near = near_lattice(own, slice_, model.settings.near_core)
-        far = far_filaments(own, slice_, releases(own, slice_), angle)
         return join(near, far, bound_vortex(own, slice_.gamma_bound))
 
     return jax.vmap(one)(state, azimuths(state, psi), jnp.arange(slices(state)))
 
 
-def node_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Velocities:
-    """Velocities at the blades' control points and at all wake nodes; slice 0 stands at azimuth psi."""
+def node_velocities(
+    model: FreeWake,
+    state: WakeState,
+    psi: float | Float[Array, ""] = 0.0,
+    old: Float[Array, "K N 3"] | None = None,
+) -> Velocities:
+    """Velocities at the blades' control points and at all wake nodes; slice 0 stands at azimuth psi.
+
+    old: what closure and ground add to them (`old_velocities`), None to sum it up here.
+    """
     angles = azimuths(state, psi)
     numbers = jnp.arange(slices(state))
     control = jax.vmap(lambda k: model.of_slice(k).control)(numbers)
-    nodes = [a.reshape(len(a), -1, 3) for a in (control, state.near, state.far)]
-    targets = jnp.concatenate(nodes, axis=1)
-    segments = wake_segments(model, state, psi)
-    places = _together(_turned(targets, angles), model.rotor.blades)
-    v = _turned(_apart(_at_instants(model, segments, places, angles), len(targets)), -angles)
+    targets = _targets(model, state)
+    segments = wake_segments(model, state, psi, "all" if old is None else "free")
+    if old is None:
+        v = _at_targets(model, segments, targets, angles)
+    else:
+        v = old + _at_targets(replace(model, ground=None), segments, targets, angles)
     v = v + jax.vmap(lambda points, angle: undisturbed(model, points, angle))(targets, angles)
-    v = jnp.split(v, np.cumsum([part.shape[1] for part in nodes])[:-1], axis=1)
-    near, far = (part.reshape(a.shape) for part, a in zip(v[1:], (state.near, state.far), strict=True))
+    ends = np.cumsum([control.shape[1], state.near.shape[1] * state.near.shape[2]])
+    at_control, *rest = jnp.split(v, ends, axis=1)
+    near, far = (part.reshape(a.shape) for part, a in zip(rest, (state.near, state.far), strict=True))
     sharpened = jax.vmap(lambda *both: _sharpened(model, *both))(control, segments)
     bent = jax.vmap(lambda k, slice_: self_induction(model.of_slice(k), slice_))(numbers, state)
-    return Velocities(v[0] + sharpened, near, far + bent)
+    return Velocities(at_control + sharpened, near, far + bent)
+
+
+def old_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Float[Array, "K N 3"]:
+    """What the closure and all images in the ground induce at control points, near and far nodes, in the blades'
+    frames over ΩR.
+
+    Over ground four fifths of all pairs; seen from the blades it changes slowly: a march may take it once a step
+    (`node_velocities`).
+    """
+    targets, angles = _targets(model, state), azimuths(state, psi)
+    found = _at_targets(model, wake_segments(model, state, psi, "old"), targets, angles)
+    if model.ground is None:
+        return found
+    return found + _at_targets(model, wake_segments(model, state, psi, "free"), targets, angles, image=True)
+
+
+def _targets(model: FreeWake, state: WakeState) -> Float[Array, "K N 3"]:
+    """Control points, near and far nodes of each slice."""
+    control = jax.vmap(lambda k: model.of_slice(k).control)(jnp.arange(slices(state)))
+    return jnp.concatenate([a.reshape(len(a), -1, 3) for a in (control, state.near, state.far)], axis=1)
+
+
+def _at_targets(
+    model: FreeWake,
+    segments: Segments,
+    targets: Float[Array, "K N 3"],
+    angles: Float[Array, " K"],
+    *,
+    image: bool = False,
+) -> Float[Array, "K N 3"]:
+    """Velocity at points of the slices' frames, all blades' at one instant in one sum; image: of the images alone."""
+    places = _together(_turned(targets, angles), model.rotor.blades)
+    if image and model.ground is not None:
+        own = replace(model, ground=None)
+        mirrored = _at_instants(own, segments, model.ground.reflect_points(places), angles)
+        found = model.ground.reflect_vectors(mirrored)
+    else:
+        found = _at_instants(model, segments, places, angles)
+    return _turned(_apart(found, len(targets)), -angles)
 
 
 def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> Float[Array, "K N 3"]:
@@ -86,7 +151,9 @@ def _at_instants(
 
     def one(operand):
         points, sources = operand
-        return segment_velocity(points, *sources, plane=model.ground, blades=blades)
+        return segment_velocity(
+            points, *sources, plane=model.ground, blades=blades, products=model.settings.pair_sums == "products"
+        )
 
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]

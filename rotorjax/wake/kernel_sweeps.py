@@ -12,7 +12,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from rotorjax.wake.kernel_pairs import Vector, add, cross, dot, influence, pairs, slopes, subtract
+from rotorjax.wake.kernel_pairs import Vector, add, cross, dot, influence, loose_pairs, pairs, slopes, subtract
+
+PRODUCT_BLOCK = 64
+"""Segments a step where the sum is a matrix product: (64, 2000) numbers stay in a core's second-level cache."""
 
 
 class Segments(NamedTuple):
@@ -25,11 +28,14 @@ class Segments(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """exponent: Vatistas n. chained: each segment starts where the last one ended. block: segments a step."""
+    """exponent: Vatistas n. chained: each segment starts where the last one ended. block: segments a step. products:
+    sum the velocity by matrix products (`_by_products`).
+    """
 
     exponent: float
     chained: bool
     block: int
+    products: bool = False
 
 
 class Block(NamedTuple):
@@ -47,6 +53,8 @@ class Block(NamedTuple):
 @partial(jax.jit, static_argnums=0)
 def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     """Velocity (3, N) at points (3, N)."""
+    if settings.products:
+        return _by_products(settings, points, segments)
     x = tuple(points)
 
     def step(total: Vector, block: Block):
@@ -57,6 +65,28 @@ def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
         return total, None
 
     return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(segments, settings))[0])
+
+
+def _by_products(settings: Settings, points: Array, segments: Segments) -> Array:
+    """The same sum as Σ k (w × x − w × s), w = Γ l/4π and s its start: a product of (6, U) with k (U, N) a step.
+
+    It takes half the time of rows added one by one, and steps of many segments leave few hand-overs between threads.
+    Written so, w × (x − s) is a difference of nearly equal numbers next to a segment: its relative error there is
+    ε |x|/|x − s|, which a core of .01 keeps below 1e-13 of the largest velocity in double and 1e-4 in single precision.
+    """
+    x, width = tuple(points), PRODUCT_BLOCK
+    # a GPU would round single precision to ten bits; asked to do so too, XLA's CPU back end takes four times as long
+    precision = None if jax.default_backend() == "cpu" else "highest"
+
+    def step(total: Array, block: Block):
+        start, end = tuple(block.nodes[:, :width]), tuple(block.nodes[:, -width:])
+        k = influence(loose_pairs(x, start, end, block.soft), settings.exponent)
+        whirl = tuple(block.whirl)
+        return total + jnp.dot(jnp.stack([*whirl, *cross(whirl, start)]), k, precision=precision), None
+
+    start = jnp.zeros((6, points.shape[1]), points.dtype)
+    total = jax.lax.scan(step, start, _blocks(segments, settings._replace(block=width)))[0]
+    return jnp.stack(cross(tuple(total[:3]), x)) - total[3:]
 
 
 @partial(jax.jit, static_argnums=0)

@@ -12,10 +12,11 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex
 
-from rotorjax.wake.dynamics import blade_loads, inputs_of
+from rotorjax.wake.dynamics import inputs_of
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluated, full_state, transported
 from rotorjax.wake.field import Velocities
 from rotorjax.wake.influence import velocity_response
+from rotorjax.wake.loads import blade_loads
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.segments import releases
 

@@ -1,6 +1,6 @@
 """A wake slice as straight vortex segments: near-wake lattice, far filaments, bound vortex."""
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -8,6 +8,8 @@ from jaxtyping import Array, Float
 from rotorjax.wake.far_wake import closure, cores, faded, segment_ages, turns_each
 from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.roll_up import Release, release, trailers
+
+Part = Literal["all", "free", "old"]
 
 
 class Segments(NamedTuple):
@@ -54,20 +56,29 @@ def releases(model: FreeWake, state: WakeState) -> Release:
     return release(model, state.near[:, -1], state.gamma_near[:, -1])
 
 
-def far_filaments(model: FreeWake, state: WakeState, start: Release, psi: Float[Array, ""]) -> Segments:
-    """Far filaments of one slice at azimuth psi, with their closure, fading and cores."""
+def far_filaments(
+    model: FreeWake, state: WakeState, start: Release, psi: Float[Array, ""], part: Part = "all"
+) -> Segments:
+    """Far filaments of one slice at azimuth psi, with their fading and cores; part: "free" turns, "old" (the closure
+    that follows them) or "all".
+    """
+    free = model.settings.far_ages
     nodes = jnp.concatenate([start.points[:, None], state.far], axis=1)
     gamma = jnp.concatenate([start.strength[:, None], state.gamma_far], axis=1)
     strength = 0.5 * (gamma[:, 1:] + gamma[:, :-1])
-    if model.settings.closure_turns:
+    if model.settings.closure_turns and part != "free":
         nodes = jnp.concatenate([nodes, closure(model, nodes, psi)], axis=1)
         more = nodes.shape[1] - 1 - strength.shape[1]
         strength = jnp.concatenate([strength, jnp.repeat(strength[:, -1:], more, axis=1)], axis=1)
+    chosen = slice(free if part == "old" else 0, strength.shape[1])
+    ages, turns = segment_ages(model)[: chosen.stop], turns_each(model)[: chosen.stop]
+    weights = faded(model, strength, ages) * turns
+    core = cores(model, start.strength[0])
     return Segments(
-        nodes[:, :-1].reshape(-1, 3),
-        nodes[:, 1:].reshape(-1, 3),
-        (faded(model, strength, segment_ages(model)) * turns_each(model)).ravel(),
-        cores(model, start.strength[0]).ravel(),
+        nodes[:, :-1][:, chosen].reshape(-1, 3),
+        nodes[:, 1:][:, chosen].reshape(-1, 3),
+        weights[:, chosen].ravel(),
+        core[:, chosen].ravel(),
     )
 
 

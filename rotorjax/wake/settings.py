@@ -12,6 +12,8 @@ from rotorjax.errors import InputError
 
 _USUAL_AZIMUTHS = 8
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
+BoundFilter = Literal["pass", "solution"]
+PairSums = Literal["rows", "products"]
 Number = Any  # Float[Array, ""]; given as a plain number too
 _POSITIVE, _AT_LEAST_0 = Range(0.0, 1e3, above=True), Range(0.0, 1e3)
 RANGES: dict[str, Range] = {
@@ -56,6 +58,13 @@ class WakeSettings(eqx.Module):
             "maximum": at `release`, the smooth maximum of the bound circulation; "centroid": that strength, at the
             circulation-weighted centroid of what it gathers; "paper": that strength, at the last outboard node
             (text below Eq. 13), to be used with `inboard=()`.
+        bound_filter: what the bound circulation follows with the time constant `circulation_lag` as the wake is marched
+            (lifting_line.py). "pass", the paper's: the circulation that the blade elements have in the wake of the
+            present one, a pass of the fixed point; on narrow panels that is up to sixteen times faster than its time
+            constant. "solution": the circulation that solves the lifting-line equation in the present wake; the same
+            equilibrium, and nothing faster than the time constant.
+        pair_sums: how velocities are summed over the segments, "rows" to the last digit or "products" in half the time
+            (`biot_savart.segment_velocity`).
 
     Arrays (differentiable; lengths over R):
         release: span station of the tip vortex's release, near the centroid of what it gathers, which is at 0.98 for
@@ -96,6 +105,8 @@ class WakeSettings(eqx.Module):
     azimuths: int = eqx.field(static=True, default=None)  # type: ignore[assignment]  (a number from `for_blades` on)
     inboard: tuple[float, ...] = eqx.field(static=True, default=(0.45, 0.8))
     roll_up: RollUp = eqx.field(static=True, default="impulse")
+    bound_filter: BoundFilter = eqx.field(static=True, default="pass")
+    pair_sums: PairSums = eqx.field(static=True, default="rows")
     release: Number = 0.971
     release_band: Number = 0.0165
     sharpness: Number = 20.0
@@ -118,6 +129,7 @@ class WakeSettings(eqx.Module):
         for name, allowed in RANGES.items():
             setattr(self, name, array(check_range(name, getattr(self, name), allowed)))
         _check_counts(self)
+        _check_choices(self)
         _check_roll_up(self)
 
     def for_blades(self, blades: int) -> "WakeSettings":
@@ -188,11 +200,16 @@ def _check_counts(settings: WakeSettings) -> None:
         )
 
 
+def _check_choices(settings: WakeSettings) -> None:
+    """Raise InputError where a choice by name is unknown."""
+    for name, choices in (("roll_up", RollUp), ("bound_filter", BoundFilter), ("pair_sums", PairSums)):
+        if (value := getattr(settings, name)) not in get_args(choices):
+            raise InputError(f"Argument `{name}` must be one of {get_args(choices)}, but is {shown(value)}")
+
+
 def _check_roll_up(settings: WakeSettings) -> None:
-    """Raise InputError where the rule is unknown, or the inboard filaments do not fit it."""
+    """Raise InputError where the inboard filaments do not fit the rule."""
     inboard, roll_up = settings.inboard, settings.roll_up
-    if roll_up not in get_args(RollUp):
-        raise InputError(f"Argument `roll_up` must be one of {get_args(RollUp)}, but is {shown(roll_up)}")
     release = float(settings.release) if known(settings.release) else 1.0
     if roll_up == "impulse" and (not inboard or inboard[-1] >= release):
         raise InputError(

@@ -9,7 +9,7 @@ import scipy.linalg
 
 from rotorjax.errors import InputError
 from rotorjax.ode.age_difference import INTERIOR, five_point_upwind
-from rotorjax.ode.runge_kutta import RK4, RK5, ButcherTableau, step
+from rotorjax.ode.runge_kutta import RK4, RK5, ButcherTableau, step, told_step
 
 
 def pendulum(t, x, strength):
@@ -25,6 +25,13 @@ def test_step_agrees_with_diffrax():
     theirs = solver.step(term, 0.2, 0.3, x, 2.0, state, made_jump=False)[0]
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-14)
+
+
+def test_a_step_tells_what_the_rhs_tells_at_its_start():
+    x, told = told_step(lambda t, x: (-x, (x, t)), 0.5, jnp.array([1.0, 2.0]), 0.1, tableau=RK4)
+    np.testing.assert_array_equal(x, step(lambda t, x: -x, 0.5, jnp.array([1.0, 2.0]), 0.1, tableau=RK4))
+    np.testing.assert_array_equal(told[0], [1.0, 2.0])
+    assert float(told[1]) == 0.5
 
 
 @pytest.mark.parametrize(("tableau", "order"), [(RK4, 4), (RK5, 5)])

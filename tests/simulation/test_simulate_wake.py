@@ -139,6 +139,8 @@ def test_the_wake_in_vtk_is_that_of_the_data(folder, start):
     ("text", "words"),
     [
         (FLIGHT.replace("freewake", "vpbfsm") + TIME + WAKE, r"\[wake\] must come with"),
+        (FLIGHT.replace("freewake", "vpbfsm") + TIME + 'precision = "single"\n', r"\[time\] precision must come with"),
+        (FLIGHT + TIME + 'old_age = "never"\n', "old_age"),
         (FLIGHT + TIME + "[wake]\npannels = 9\n", "panels"),
         (FLIGHT + TIME + '[wake]\npanels = "many"\n', "panels"),
         (OVER_GROUND + "slope_deg = 5.0\n" + TIME, "advance_ratio must be 0 over sloping ground"),

@@ -20,7 +20,7 @@ from rotorjax.validation import heave, heaving
 from rotorjax.validation.case import Subject
 from rotorjax.validation.heave import Each
 from rotorjax.validation.heaving import Heave, Heaving, of_finite_states, of_free_wake
-from rotorjax.wake.dynamics import WakeInputs
+from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
 

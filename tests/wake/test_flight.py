@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.wake.dynamics import blade_loads, carried_on, inputs_of
+from rotorjax.wake.dynamics import carried_on, inputs_of
 from rotorjax.wake.equilibrium import evaluated, full_state, spread
 from rotorjax.wake.field import Velocities, carried, undisturbed
+from rotorjax.wake.loads import blade_loads
 from rotorjax.wake.model import Flight, free_wake, on_blade
 from rotorjax.wake.settings import flight_settings
 from rotorjax.wake.start import prescribed

@@ -1,0 +1,245 @@
+"""The coupled rotor marched step by step at a fixed cost: for a simulator's loop, and what `rotorjax simulate` flies.
+
+    march = rj.march(trimmed)                                   # compiles, once
+    state = march.start
+    while flying:
+        state = march.step(state, replace(march.inputs, theta_0=...))
+
+A step is one of Runge and Kutta's classical ones, with controls held over it. A free wake is marched on the solution of
+its lifting line (wake/lifting_line.py), with sums by matrix products (wake/kernel_sweeps.py), and at choice in single
+precision and with what its closure and the ground induce summed once a step, or every other step, and carried on along
+a straight line through the sum before. Seen from the blades that changes slowly; it is four fifths of all pairs in
+hover over ground.
+"""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, PyTree
+
+from rotorjax.checks import check_whole, shown
+from rotorjax.coupled import Coupled, CoupledState, Outputs, old_induced, rate_and_output
+from rotorjax.coupled_wake import CoupledWake
+from rotorjax.errors import InputError
+from rotorjax.ode.runge_kutta import RK4, told_step
+from rotorjax.rotor.hub import RotorInputs
+from rotorjax.simulation.case import OldAge, Precision
+from rotorjax.simulation.start import Start, from_result
+from rotorjax.simulation.step import least_steps, usual_steps
+from rotorjax.trim.run import Result
+
+WIDE = {"xla_cpu_prefer_vector_width": 512}
+"""For XLA's CPU back end: registers as wide as the machine has; a quarter off the sums' time where it has 512 bits."""
+
+
+class MarchState(eqx.Module):
+    """Where a march stands. x: state, azimuth from 0 to 2π. y: outputs at the start of the step that led here, NaN
+    before the first. steps: made so far. finite: whether all of x is. old (2, B, N, 3): what closure and ground induced
+    when they were summed last and before, None where every stage does it; every (static): steps from one sum to the
+    next. Arrays have a leading axis in a march of several.
+    """
+
+    x: CoupledState
+    y: Outputs
+    steps: Int[Array, ""]
+    finite: Bool[Array, ""]
+    old: Float[Array, "2 B N 3"] | None = None
+    every: int = eqx.field(static=True, default=1)
+
+
+def begun(x: CoupledState, u: RotorInputs, p: Coupled, old_age: OldAge) -> MarchState:
+    """State of a march before its first step."""
+
+    def none(of: PyTree) -> Any:
+        return jax.tree.map(lambda v: jnp.full(v.shape, jnp.nan, v.dtype), of)
+
+    y = jax.eval_shape(lambda: rate_and_output(jnp.zeros(()), x, u, p)[1])
+    old = None
+    if isinstance(p, CoupledWake) and old_age != "stage":
+        old = none(jax.eval_shape(lambda: jnp.stack([old_induced(x, u, p)] * 2)))
+    every = 2 if old_age == "two steps" else 1
+    return MarchState(x, none(y), jnp.zeros((), jnp.int32), jnp.ones((), bool), old, every)
+
+
+def advance(
+    state: MarchState, t: Float[Array, ""], dt: Float[Array, ""], inputs: Callable[[Array], RotorInputs], p: Coupled
+) -> MarchState:
+    """One step of dt from Ω_ref t; inputs: of Ω_ref t, asked for at each stage."""
+    sums = None if state.old is None else _summed(state, inputs(t), p)
+    since = state.steps % state.every
+
+    def rate(s: Array, x: CoupledState) -> tuple[CoupledState, Outputs]:
+        old = None
+        if sums is not None:
+            old = sums[0] + (since + (s - t) / dt) / state.every * (sums[0] - sums[1])
+        return rate_and_output(s, x, inputs(s), p, old)
+
+    x, y = told_step(rate, t, state.x, dt, tableau=RK4)
+    finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(x)]).all()
+    x = eqx.tree_at(lambda x: x.psi, x, jnp.mod(x.psi, 2 * np.pi))
+    return MarchState(x, y, state.steps + 1, finite, sums, state.every)
+
+
+def _summed(state: MarchState, u: RotorInputs, p: Coupled) -> Float[Array, "2 B N 3"]:
+    """The last two sums of what closure and ground induce, a new one made where it is due."""
+    assert isinstance(p, CoupledWake)
+    assert state.old is not None
+    last = state.old[0]
+
+    def anew() -> Array:
+        now = old_induced(state.x, u, p)
+        return jnp.stack([now, jnp.where(state.steps == 0, now, last)])
+
+    if state.every == 1:
+        return anew()
+    return jax.lax.cond(state.steps % state.every == 0, anew, lambda: state.old)
+
+
+def precision_of(precision: Precision) -> AbstractContextManager:
+    """In which to trace, compile and make arrays: single precision is that of jax without x64, in this thread alone.
+
+    Raises InputError for an unknown one, and for double precision that jax has not switched on.
+    """
+    if precision not in get_args(Precision):
+        raise InputError(f"Argument `precision` must be one of {get_args(Precision)}, but is {shown(precision)}")
+    if precision == "single":
+        return jax.enable_x64(False)
+    if not jax.config.jax_enable_x64:  # pyright: ignore[reportAttributeAccessIssue]
+        raise InputError("Argument `precision` must be 'single' unless jax_enable_x64 is on, but is 'double'")
+    return nullcontext()
+
+
+def cast(tree: PyTree, precision: Precision) -> PyTree:
+    """Arrays and numbers as arrays of a precision; whole numbers and everything else as they are."""
+    dtype = np.float32 if precision == "single" else np.float64
+
+    def one(leaf: Any) -> Any:
+        inexact = isinstance(leaf, jax.Array | np.ndarray | float) and np.issubdtype(np.asarray(leaf).dtype, np.inexact)
+        return np.asarray(leaf, dtype) if inexact else leaf
+
+    return jax.tree.map(one, tree)
+
+
+def _is_array(leaf: Any) -> bool:
+    return isinstance(leaf, jax.Array | np.ndarray)
+
+
+def on_device(tree: PyTree) -> PyTree:
+    """Arrays as jax's own, in the precision of the context."""
+    return jax.tree.map(lambda v: jnp.asarray(v) if _is_array(v) else v, tree)
+
+
+def compiled(function: Callable, *args: Any) -> Callable:
+    """A function's program for arguments of these shapes, static leaves bound. To be made inside `precision_of`."""
+    arrays, static = eqx.partition(args, _is_array)
+    options = WIDE if jax.default_backend() == "cpu" else None
+    program = jax.jit(lambda arrays: function(*eqx.combine(arrays, static)), compiler_options=options)
+    made = program.lower(arrays).compile()
+    return lambda *args: made(eqx.filter(args, _is_array))
+
+
+def stretch(
+    count: int, state: MarchState, t: Float[Array, ""], dt: Float[Array, ""], driver: PyTree, p: Coupled
+) -> MarchState:
+    """`count` steps of dt from Ω_ref t; driver: makes inputs of Ω_ref t."""
+
+    def one(state: MarchState, i: Array) -> tuple[MarchState, None]:
+        return advance(state, t + i.astype(t.dtype) * dt, dt, driver, p), None
+
+    return jax.lax.scan(one, state, jnp.arange(count))[0]
+
+
+@dataclass(frozen=True)
+class March:
+    """A compiled march. start: state to begin with. inputs: of the trim, to be changed from step to step; in a march
+    of several, with a leading axis as the states. seconds: that a step stands for, at the nominal rotor speed.
+    """
+
+    start: MarchState
+    inputs: RotorInputs
+    steps_per_turn: int
+    seconds: float
+    precision: Precision
+    _program: Callable[[MarchState, RotorInputs], MarchState]
+
+    def step(self, state: MarchState, controls: RotorInputs | None = None) -> MarchState:
+        """The state after one step with controls held over it (None: the trim's). Waits for the result.
+
+        Raises FloatingPointError where it is not finite; the state that was given is the last one that is.
+        """
+        controls = self.inputs if controls is None else cast(controls, self.precision)
+        found = jax.block_until_ready(self._program(state, controls))
+        if not np.all(found.finite):
+            raise FloatingPointError(
+                f"the march left the finite numbers in step {np.max(found.steps)}: the state before it is the last"
+            )
+        return found
+
+
+def marching(p: Coupled, **choices: Any) -> Coupled:
+    """The coupled rotor as it is marched: a free wake on the solution of its lifting line, or as `choices` say."""
+    if not isinstance(p, CoupledWake):
+        return p
+    return replace(p, settings=replace(p.settings, **{"bound_filter": "solution", "pair_sums": "products", **choices}))
+
+
+def march(
+    trimmed: Result | Start,
+    steps_per_turn: int | None = None,
+    *,
+    precision: Precision = "single",
+    old_age: OldAge = "step",
+    batch: int | None = None,
+    bound_filter: Literal["pass", "solution"] = "solution",
+) -> March:
+    """March a trim with any inflow, one step at a time (the module tells how).
+
+    steps_per_turn: of a revolution, None for what the wake needs, at least 24, or 120 without one. old_age: what a free
+    wake's closure and the ground induce is summed in "two steps", a "step" or a "stage" once. batch: so many marches at
+    once, states and controls with a leading axis. bound_filter: "pass" for the paper's, which needs ten times the
+    steps.
+
+    Raises InputError where the steps are too few for the wake, with the number that is enough.
+    """
+    start = trimmed if isinstance(trimmed, Start) else from_result(trimmed)
+    if batch is not None:
+        check_whole("batch", batch, 1, 100_000)
+    if old_age not in get_args(OldAge):
+        raise InputError(f"Argument `old_age` must be one of {get_args(OldAge)}, but is {shown(old_age)}")
+    context = precision_of(precision)
+    start = replace(start, p=marching(start.p, bound_filter=bound_filter))
+    steps = usual_steps(start) if steps_per_turn is None else check_whole("steps_per_turn", steps_per_turn, 1, 100_000)
+    if steps_per_turn is not None and steps < (least := least_steps(start)):
+        raise InputError(f"Argument `steps_per_turn` must be at least {least} for this wake, but is {steps}")
+    angle = 2 * np.pi / steps
+    with context:
+        x, u, p = on_device(cast((start.x, start.inputs, start.p), precision))
+        first = begun(x, u, p, old_age)
+        dt = jnp.asarray(angle)
+
+        def one(state: MarchState, controls: RotorInputs, p: Coupled) -> MarchState:
+            return advance(state, jnp.zeros_like(dt), dt, lambda _: controls, p)
+
+        if batch is not None:
+            first, u = jax.tree.map(lambda v: jnp.broadcast_to(v, (batch, *v.shape)), (first, u))
+        run = one if batch is None else _several(one)
+        program = compiled(run, first, u, p)
+    seconds = angle / float(start.p.operating.omega)
+    return March(first, u, steps, seconds, precision, lambda state, controls: program(state, controls, p))
+
+
+def _several(one: Callable) -> Callable:
+    """Of marches side by side: one after the other on a CPU, whose caches a single one fills, at once elsewhere."""
+
+    def all_of(states: MarchState, controls: RotorInputs, p: Coupled) -> MarchState:
+        if jax.default_backend() == "cpu":
+            return jax.lax.map(lambda both: one(*both, p), (states, controls))
+        return jax.vmap(lambda s, u: one(s, u, p))(states, controls)
+
+    return all_of
