@@ -1,9 +1,9 @@
 """A free wake as a scene to turn: blades, near wake, tip vortices and inboard filaments over the ground."""
 
 import numpy as np
+from jaxtyping import Float
 
 from rotorjax.io.scene import Layer, Scene
-from rotorjax.wake.model import FreeWake
 from rotorjax.wake.seen import Seen, seen_around
 from rotorjax.wake.solution import Solution
 
@@ -18,7 +18,7 @@ def solved_scene(found: Solution) -> Scene:
     slope = 0.0 if model.ground is None else float(np.rad2deg(model.ground.slope))
     return Scene(
         title=f"{model.rotor.name}, {where}" + (f", slope {slope:g}°" if slope else ""),
-        layers=layers(frames, model),
+        layers=layers(frames, np.rad2deg(np.asarray(model.settings.filament_ages))),
         facts=_facts(found),
         times=tuple(f"ψ = {p:.0f}°" for p in psi),
         height=None if model.ground is None else float(model.ground.height),
@@ -27,12 +27,12 @@ def solved_scene(found: Solution) -> Scene:
     )
 
 
-def layers(frames: Seen, model: FreeWake) -> tuple[Layer, ...]:
+def layers(frames: Seen, ages_deg: Float[np.ndarray, " A"]) -> tuple[Layer, ...]:
     """What is drawn of wakes with leading axes (frames T, blades B)."""
     strands, lattice, circulation = (np.asarray(v) for v in (frames.filaments, frames.lattice, frames.circulation))
     count = strands.shape[:3]
     shape = (len(strands), -1, strands.shape[3])
-    age = np.broadcast_to(np.rad2deg(np.asarray(model.settings.filament_ages)), strands.shape[:-1])
+    age = np.broadcast_to(ages_deg, strands.shape[:-1])
     tip = np.broadcast_to(np.arange(count[2]) == 0, count)
 
     def chosen(values: np.ndarray, of: np.ndarray) -> np.ndarray:

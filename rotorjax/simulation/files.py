@@ -6,14 +6,15 @@ from typing import Any
 from rotorjax.bench import plotting
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json
+from rotorjax.io.scene import write_scene
 from rotorjax.simulation import output
 from rotorjax.simulation.run import Simulated
-from rotorjax.simulation.wake_output import write_vtk
+from rotorjax.simulation.wake_output import wake_scene, write_vtk
 from rotorjax.simulation.wake_pictures import wake_film, wake_picture
 
 
 def write_all(found: Simulated, out: Path, *, animated: bool = False) -> dict[str, Any]:
-    """Write history.nc, report.json and histories.png; of a free wake wake.png and vtk/; if asked for animation.gif.
+    """Write history.nc, report.json, histories.png; of a free wake wake.png, wake.html, vtk/; on request animation.gif.
 
     Returns the report. Raises InputError where a file cannot be written.
     """
@@ -25,6 +26,7 @@ def write_all(found: Simulated, out: Path, *, animated: bool = False) -> dict[st
     wake = "wake_filaments" in data
     if wake:
         write_vtk(out / "vtk", data)
+        write_scene(out / "wake.html", wake_scene(data))
         plotting.save(wake_picture(data), out / "wake")
     if animated and wake:
         wake_film(data, output.over_a_turn(data, "CT"), out / "animation.gif")

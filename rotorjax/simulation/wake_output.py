@@ -9,16 +9,19 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
+from rotorjax.bench.wake_scene import layers
 from rotorjax.coupled import CoupledState, blades_at
 from rotorjax.coupled_wake import CoupledWake, model_of
 from rotorjax.io import vtk
 from rotorjax.io.atomic import make_folder
+from rotorjax.io.scene import Scene
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.run import SAVES, Simulated
 from rotorjax.wake.seen import Seen, seen_slice
 
 KINDS = {"blade": 0, "tip vortex": 1, "inboard filament": 2}
 """Numbers of `kind` in the VTK files."""
+MOST_SEEN, STILL = 48, 0.01  # frames of a page; R that the ground may move there
 
 
 def seen(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Seen:
@@ -81,6 +84,26 @@ def change(x: CoupledState) -> Float[np.ndarray, " T"]:
     found = np.full(len(nodes), np.nan)
     found[SAVES:] = np.sqrt(np.mean(np.sum((nodes[SAVES:] - nodes[:-SAVES]) ** 2, axis=2), axis=1))
     return found
+
+
+def wake_scene(data: xr.Dataset) -> Scene:
+    """The flight's wake to turn and play; at most MOST_SEEN of its frames, ground as far as it stays where it is."""
+    one = data.isel(frame=slice(None, None, -(-data.sizes["frame"] // MOST_SEEN)))
+    frames = Seen(**{name: one[f"wake_{name}"].to_numpy() for name in Seen._fields})
+    times = one["time"].to_numpy()[one["frame"].to_numpy()]
+    height = one["height"].to_numpy() if "height" in one else np.array([np.nan])
+    still = bool(np.all(np.isfinite(height))) and float(np.ptp(height)) < STILL
+    facts = {"flight": f"{times[0]:.2f} to {times[-1]:.2f} s"}
+    if "height" in one and not still:
+        facts["ground"] = "moves, not drawn"
+    return Scene(
+        title=f"{data.attrs['rotor']} in flight",
+        layers=layers(frames, one["age"].to_numpy()),
+        facts=facts,
+        times=tuple(f"{t:.3f} s" for t in times),
+        height=float(height.mean()) if still else None,
+        slope_deg=float(data.attrs.get("slope_deg", 0.0) or 0.0),
+    )
 
 
 def write_vtk(folder: str | Path, data: xr.Dataset) -> list[Path]:

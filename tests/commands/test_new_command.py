@@ -28,10 +28,13 @@ def test_what_is_written_runs_as_it_is_told(kind, tmp_path, capsys):
 @pytest.mark.parametrize("kind", ["gust", "freewake"])
 def test_what_takes_longer_is_read_and_allowed(kind, tmp_path):
     from rotorjax.simulation.case import read_case
+    from rotorjax.wake.settings import wake_settings
 
     assert main(["new", kind, str(tmp_path)]) == 0
     case = read_case(tmp_path / "case.toml")
     assert case.request.inflow == {"gust": "vpbfsm", "freewake": "freewake"}[kind]
+    if kind == "freewake":
+        assert wake_settings(**case.wake).panels == 8
 
 
 def test_every_key_of_a_rotor_file_is_shown(tmp_path):
