@@ -89,7 +89,7 @@ def change(x: CoupledState) -> Float[np.ndarray, " T"]:
 def wake_scene(data: xr.Dataset) -> Scene:
     """The flight's wake to turn and play; at most MOST_SEEN of its frames, ground as far as it stays where it is."""
     one = data.isel(frame=slice(None, None, -(-data.sizes["frame"] // MOST_SEEN)))
-    frames = Seen(**{name: one[f"wake_{name}"].to_numpy() for name in Seen._fields})
+    frames = Seen(**{name: jnp.asarray(one[f"wake_{name}"].to_numpy()) for name in Seen._fields})
     times = one["time"].to_numpy()[one["frame"].to_numpy()]
     height = one["height"].to_numpy() if "height" in one else np.array([np.nan])
     still = bool(np.all(np.isfinite(height))) and float(np.ptp(height)) < STILL
