@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, PyTree
+from jaxtyping import Array, Float, PyTree
 
 from rotorjax.coupled import Coupled, CoupledRotor, CoupledState, RotorState, rate_and_output
 from rotorjax.coupled_wake import CoupledWake
@@ -33,7 +33,6 @@ from rotorjax.simulation.start import from_wake, state_at
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.problem import inputs_at, revolution
 from rotorjax.trim.solve import Trimmed
-from rotorjax.wake.model import WakeState
 
 AZIMUTHS = 48
 """Of a revolution, at which a model that changes with the azimuth is linearised."""
@@ -166,7 +165,7 @@ def linear_rotor(
         found, states=names, state_units=units, output_units=tuple(map(readings.unit_of, found.outputs)),
         notes=_notes(base),
     )  # fmt: skip
-    return replace(found, period=2 * np.pi) if base.steady else unfolded(found, start, base.p.rotor.blades)
+    return replace(found, period=2 * np.pi) if base.steady else unfolded(found, base.p.rotor.blades)
 
 
 def drive_names(u: Drive) -> tuple[str, ...]:
@@ -183,19 +182,14 @@ def output_names(p: Coupled, ground: bool) -> tuple[str, ...]:
     return ("CT", "CQ", *"XYZLMN", *motions, "lambda_0", "lambda_1c", "lambda_1s", *clear, *lifts)
 
 
-def unfolded(model: PeriodicModel, start: SteadyState, blades: int) -> PeriodicModel:
-    """The model over a whole revolution, from that over a B-th of it: every differential coordinate changes its sign
-    from one part to the next.
-    """
-    signs = np.array([-1.0 if name == "D" else 1.0 for name in multiblade.names(blades)])
+def signs(names: Sequence[str]) -> Float[np.ndarray, " n"]:
+    """−1 for differential coordinates, which change their sign from one B-th of a revolution to the next."""
+    return np.array([-1.0 if "_D" in name else 1.0 for name in names])
 
-    def of_blades(leaf: Array) -> np.ndarray:
-        return np.broadcast_to(signs.reshape(-1, *[1] * (leaf.ndim - 1)), leaf.shape)
 
-    wake = isinstance(start.inflow, WakeState)
-    inflow = jax.tree.map(of_blades if wake else np.ones_like, start.inflow)
-    s = np.asarray(ravel_pytree((jax.tree.map(of_blades, start.rotor), inflow))[0])
-    o = np.array([-1.0 if name.partition("[")[0].endswith("_D") else 1.0 for name in model.outputs])
+def unfolded(model: PeriodicModel, blades: int) -> PeriodicModel:
+    """The model over a whole revolution, from that over a B-th of it."""
+    s, o = signs(model.states), signs(model.outputs)
     u = np.ones(len(model.inputs))
 
     def copies(values: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
