@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.coupled import Coupled
-from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import rotor, steps
 from rotorjax.linearisation.compact import Compact, check_order, compact, frequencies, gaps, kept_states
@@ -20,7 +19,6 @@ from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.trim.problem import Controls, inputs_at
 from rotorjax.trim.run import FREE_WAKE, Progress, Request, Result, prepare, run
-from rotorjax.wake.settings import flight_settings
 
 CONTROLS = ("theta_0", "theta_1c", "theta_1s", "u", "v", "w", "p", "q", "r")
 """Inputs by default."""
@@ -85,13 +83,14 @@ def check(request: Request, wanted: Wanted) -> None:
 
 def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
     """Rotor and inputs of a flight, its controls not yet known, and the inflow's name."""
+    if request.inflow == FREE_WAKE:
+        raise InputError(
+            "Argument `inflow` must be uniform, pitt-peters or vpbfsm about a trim, but is 'freewake': of free wakes "
+            "that of rigid blades in hover is linearised (linearisation.run)"
+        )
     tilt = request.flight.tilt
     still = Controls(0 * tilt, 0 * tilt, 0 * tilt, tilt)
-    hub = inputs_at(still, request.flight)
-    if request.inflow != FREE_WAKE:
-        return prepare(request)[0], hub, f"{request.inflow} inflow"
-    settings = request.wake or flight_settings(request.rotor.blades)
-    return coupled_wake(request.rotor, request.operating, settings, request.ground), hub, "a free wake"
+    return prepare(request)[0], inputs_at(still, request.flight), f"{request.inflow} inflow"
 
 
 def linearise_flight(

@@ -7,16 +7,26 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.flatten_util import ravel_pytree
+from wakes import COARSE
 
+from rotorjax.coupled import RotorState
+from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import flight, steps
 from rotorjax.linearisation.compact import compact, frequencies, reduced
+from rotorjax.linearisation.drive import drive_of
 from rotorjax.linearisation.modes import modes
-from rotorjax.linearisation.rotor import base_of, linear_rotor
+from rotorjax.linearisation.rotor import SteadyState, base_of, linear_rotor, rate_and_readings, state_names
 from rotorjax.ode.harmonic import average, harmonic_model
 from rotorjax.ode.hill import harmonic_transfer
 from rotorjax.rotor.flap_lag import flap_frequency, lag_frequency
+from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.trim.run import request, run
+from rotorjax.wake.equilibrium import full_state, spread
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.start import prescribed
 
 INPUTS = ("theta_0", "theta_1c", "theta_1s", "w", "q")
 
@@ -158,6 +168,25 @@ def test_small_models_keep_the_blades_and_the_responses(in_flight):
     assert small.states[:3] == ("beta_0", "beta_1c", "beta_1s")
     assert small.states[12:15] == ("lambda_0", "lambda_1c", "lambda_1s")
     np.testing.assert_allclose(small.response(np.zeros(1)), whole.response(np.zeros(1)), rtol=1e-6, atol=1e-9)
+
+
+def test_a_wake_that_is_alike_on_all_blades_stays_so_at_every_azimuth(uh60):
+    """In multi-blade coordinates the rates of a level hover do not depend on the azimuth, and have no cyclic part."""
+    settings = wake_settings(**COARSE)
+    own = full_state(free_wake(*uh60, None, settings), spread(prescribed(free_wake(*uh60, None, settings), 0.05), 1))[0]
+    p, still = coupled_wake(*uh60, settings), jnp.zeros(4)
+    wake = jax.tree.map(lambda v: jnp.concatenate([v, jnp.zeros((3, *v.shape[1:]))]), own)
+    x = SteadyState(RotorState(still.at[0].set(0.05), still, still.at[0].set(0.03), still), wake)
+    program = eqx.filter_jit(rate_and_readings)
+    u = drive_of(rotor_inputs(theta_0=0.3), p)
+    (one, read), (other, again) = (program(jnp.asarray(psi), x, u, p) for psi in (0.0, 0.7))
+    flat, turned = (np.asarray(ravel_pytree(rate)[0]) for rate in (one, other))
+    np.testing.assert_allclose(flat, turned, atol=1e-12 * np.abs(flat).max())
+    names = state_names(x, p)[0]
+    uneven = [k for k, name in enumerate(names) if any(part in name for part in ("_1c", "_1s", "_D"))]
+    assert len(names) == flat.size == len(set(names))
+    assert np.abs(flat[uneven]).max() < 1e-12
+    assert float(read["CT"]) == pytest.approx(float(again["CT"]), rel=1e-12)
 
 
 def test_a_trim_that_failed_is_refused(hover):
