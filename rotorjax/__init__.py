@@ -21,6 +21,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "velocity": "rotorjax.api.solved",
     "performance": "rotorjax.api.solved",
     "linearise": "rotorjax.api.applications",
+    "modes": "rotorjax.linearisation.modes",
     "simulate": "rotorjax.api.applications",
     "march": "rotorjax.api.applications",
     "calibrate": "rotorjax.api.applications",

@@ -16,7 +16,7 @@ FLOORS = (  # from the ground up; a room may import from lower floors, and from 
     ("limits",),
     ("coupled_wake", "coupled"),
     ("bench",),
-    ("trim", "linearisation", "calibration", "simulation", "deck"),
+    ("trim", "calibration", "simulation", "linearisation", "deck"),
     ("study", "validation"),
     ("api",),
     ("commands",),

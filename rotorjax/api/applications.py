@@ -11,6 +11,7 @@ from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
+    from rotorjax.linearisation.handover import Time
     from rotorjax.ode.models import LinearModel, PeriodicModel
     from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
@@ -43,35 +44,49 @@ def linearise(
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
     harmonics: Sequence[int] | None = (0,),
+    order: int | None = None,
+    time: "Time" = "azimuth",
 ) -> "LinearModel | PeriodicModel":
-    """Linearise the equations that are marched, about a free wake in hover or a trim with an inflow model.
+    """Linearise the equations that are marched, about a trim with an inflow model or a rigid rotor's hovering wake.
 
-    inputs, outputs: names, None for all. harmonics: those that the time-invariant model keeps, (0,) for the mean;
-    None for the model that is periodic in azimuth. Time is azimuth (rad). Raises InputError where it has not converged
-    or a name is unknown, and for a trim in the free wake or a finite-state hover, which have no linear model here.
+    inputs, outputs: names (`linearisation.drive`, `.readings` have them), None for all. harmonics: those that the
+    time-invariant model keeps, (0,) for the mean; None for the model that is periodic in azimuth. order: states of a
+    reduced model of a trim, which keeps those of the blades. time: "azimuth" (rad, rotor units) or "seconds" (SI).
+    Raises InputError where it has not converged, a name is unknown or the order too low, and for a trim in the free
+    wake or a finite-state hover, which have no linear model here.
 
     >>> import rotorjax as rj
     >>> hover = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", azimuths=8)
     >>> rj.linearise(hover, ["theta_0"], ["CT"]).b.shape[1]
     1
     """
+    from rotorjax.linearisation.compact import reduced
+    from rotorjax.linearisation.handover import handed_over
+    from rotorjax.linearisation.rotor import base_of, linear_rotor
     from rotorjax.linearisation.system import linear_wake
     from rotorjax.ode.harmonic import harmonic_model
-    from rotorjax.trim.linear import OUTPUTS, linear_model
     from rotorjax.trim.run import Result
     from rotorjax.trim.solve import Trimmed
 
+    def named(names: Sequence[str] | None) -> tuple[str, ...] | None:
+        return None if names is None else tuple(names)
+
     if isinstance(about, Solved) and isinstance(about.found, Solution):
-        names = (None if v is None else tuple(v) for v in (inputs, outputs))
-        periodic = linear_wake(about.found, *names)
+        periodic, flown = linear_wake(about.found, named(inputs), named(outputs)), about.model
     elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
-        periodic = linear_model(about.trimmed, inputs, OUTPUTS if outputs is None else outputs)
+        periodic, flown = linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
     else:
         raise InputError(
             "Argument `about` must be a free wake in hover or a trim with inflow 'uniform', 'pitt-peters' or 'vpbfsm', "
             "but is neither: trim with one of these"
         )
-    return periodic if harmonics is None else harmonic_model(periodic, tuple(harmonics))
+    if harmonics is None:
+        if order is not None:
+            raise InputError(f"Argument `order` must be left out of a periodic model (harmonics None), but is {order}")
+        return handed_over(periodic, flown.rotor, flown.operating, time)
+    model = harmonic_model(periodic, tuple(harmonics))
+    model = model if order is None else reduced(model, order)
+    return handed_over(model, flown.rotor, flown.operating, time)
 
 
 def simulate(case: str | Path, progress: Callable[[str], None] | None = None) -> "Simulated":

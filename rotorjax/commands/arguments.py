@@ -23,11 +23,10 @@ def add_rotor(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_place(parser: argparse.ArgumentParser) -> None:
-    """--height, --slope and --climb."""
-    parser.add_argument(
-        "--height", type=float, metavar="H", help="hub over ground, over R (none: out of ground effect)"
-    )
+def add_place(parser: argparse.ArgumentParser, several: bool = False) -> None:
+    """--height (or several of them), --slope and --climb."""
+    about = "hub over ground, over R (none: out of ground effect)"
+    parser.add_argument("--height", type=float, nargs="+" if several else None, metavar="H", help=about)
     parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
 

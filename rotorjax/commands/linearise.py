@@ -1,43 +1,139 @@
-"""`rotorjax linearise`: state-space models of the free wake about its periodic state."""
+"""`rotorjax linearise`: linear state-space models of the whole rotor about a trim, or of a rigid rotor's free wake."""
 
 import argparse
+import math
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotorjax.commands.arguments import add_place, add_rotor
+
+if TYPE_CHECKING:
+    from rotorjax.trim.run import Request
 
 
 def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "linearise",
-        help="linear state-space models of the free wake",
-        description="Solve one periodic wake, linearise it and write full and reduced models (NetCDF and .mat), "
-        "stability, Bode and step pictures, linearise.json and report.md. Exit code 1 where the wake did not converge.",
+        help="linear state-space models of the rotor about a trim, or of its free wake",
+        description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
+        "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes by "
+        "name, linearise.json and report.md; several speeds or heights make a scheduled model. Without one: the free "
+        "wake of rigid blades at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
     )
+    add = parser.add_argument
     add_rotor(parser)
-    add_place(parser)
-    parser.add_argument(
-        "--inputs", metavar="NAMES", default="collective", help="by commas: collective, climb, height (collective)"
-    )
-    parser.add_argument(
-        "--outputs", metavar="NAMES", default="CT,lambda0", help="by commas: CT, CQ, lambda0, inflow (CT,lambda0)"
-    )
-    parser.add_argument("--order", type=int, default=20, metavar="N", help="states of the reduced model (20)")
-    parser.add_argument(
-        "--harmonics",
-        type=int,
-        default=0,
-        metavar="K",
-        help="over a slope: harmonics of a blade's passage in the time-invariant model (0: averaging)",
-    )
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
-    parser.add_argument("--quick", action="store_true", help="coarser free wake")
-    parser.set_defaults(run=run)
+    thrust = parser.add_mutually_exclusive_group()
+    thrust.add_argument("--thrust-coefficient", type=float, metavar="CT", help="T/(ρA(ΩR)²), along the shaft")
+    thrust.add_argument("--weight", type=float, metavar="N", help="thrust in newtons")
+    speed = parser.add_mutually_exclusive_group()
+    speed.add_argument("--advance-ratio", type=float, nargs="+", metavar="MU", help="horizontal speed over ΩR (0)")
+    speed.add_argument("--speed", type=float, nargs="+", metavar="V", help="horizontal speed in m/s")
+    add_place(parser, several=True)
+    add("--tilt", type=float, default=0.0, metavar="DEG", help="shaft forward (0)")
+    add("--inflow", metavar="MODEL", help="uniform, pitt-peters, vpbfsm (pitt-peters; without a thrust freewake)")
+    add("--inputs", metavar="NAMES", help="by commas (controls and hub motion; of a wake collective)")
+    add("--outputs", metavar="NAMES", help="by commas (hub loads, blades and inflow; of a wake CT,lambda0)")
+    add("--order", type=int, default=20, metavar="N", help="states of the reduced model (20)")
+    add("--harmonics", type=int, default=0, metavar="K", help="harmonics in the time-invariant model up to K (0: mean)")
+    add("--azimuths", type=int, metavar="N", help="of a revolution, at which a rotor is linearised (48)")
+    add("--time", choices=("seconds", "azimuth"), default="seconds", help="seconds with SI units (default), or azimuth")
+    add("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
+    add("--quick", action="store_true", help="coarser free wake of rigid blades")
+    parser.set_defaults(run=run, free_wake=lambda chosen: chosen.thrust_coefficient is None and chosen.weight is None)
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Solve, linearise and write; the exit code."""
+    """Solve or trim, linearise and write; the exit code."""
+    trimmed = chosen.thrust_coefficient is not None or chosen.weight is not None
+    return _flights(chosen) if trimmed else _wake(chosen)
+
+
+def _flights(chosen: argparse.Namespace) -> int:
+    """Models of a trimmed rotor, at one place or several."""
+    from tqdm import tqdm
+
+    from rotorjax.commands.arguments import introduce, names_of
+    from rotorjax.io.atomic import make_folder
+    from rotorjax.linearisation import flight, flight_output, schedule
+
+    _refuse(chosen, {"quick": False, "collective": None}, "belongs to a free wake of rigid blades, not to a trim")
+    named = {
+        key: default if text is None else names_of(text)
+        for key, text, default in (
+            ("inputs", chosen.inputs, flight.CONTROLS),
+            ("outputs", chosen.outputs, flight.OUTPUTS),
+        )
+    }
+    azimuths = {} if chosen.azimuths is None else {"azimuths": chosen.azimuths}
+    wanted = flight.Wanted(**named, order=chosen.order, harmonics=chosen.harmonics, **azimuths)
+    requests = _requests(chosen)
+    for request in requests:
+        flight.check(request, wanted)
+    out = make_folder(chosen.out)
+    introduce(requests[0].rotor, requests[0].operating, moves=True)
+    with tqdm(bar_format="linearise: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
+
+        def progress(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
+
+        found = schedule.flights(requests, wanted, progress)
+    lost = [one for one in found if not isinstance(one, flight.LinearFlight)]
+    for one in lost:
+        print(f"advance ratio {one.request.advance:g}: not converged: {one.trimmed.outcome.why}")
+    flown = [one for one in found if isinstance(one, flight.LinearFlight)]
+    if len(requests) == 1:
+        for one in flown:
+            flight_output.write(one, out, chosen.time)
+    elif flown:
+        schedule.write(flown, out, chosen.time)
+    for one in flown:
+        print(flight_output.lines(one))
+    print(f"written: {out}")
+    return 1 if lost else 0
+
+
+def _requests(chosen: argparse.Namespace) -> "list[Request]":
+    """One trim for every speed and height."""
+    from dataclasses import replace
+
+    from rotorjax.errors import InputError
+    from rotorjax.trim.run import FREE_WAKE, request
+
+    if chosen.inflow == FREE_WAKE:
+        raise InputError(
+            "Argument `inflow` must be uniform, pitt-peters or vpbfsm with a thrust, but is 'freewake': leave the "
+            "thrust out for the free wake of rigid blades in hover"
+        )
+    base = request(
+        chosen.rotor,
+        1e-3,
+        chosen.inflow or "pitt-peters",
+        slope_deg=chosen.slope,
+        climb=chosen.climb,
+        tilt_deg=chosen.tilt,
+    )
+    radius, tip = float(base.rotor.radius), float(base.operating.tip_speed(base.rotor.radius))
+    thrust = chosen.thrust_coefficient
+    if thrust is None:
+        thrust = chosen.weight / (float(base.operating.density) * math.pi * radius**2 * tip**2)
+    base = replace(base, thrust=thrust)
+    speeds = chosen.advance_ratio or [v / tip for v in chosen.speed or [0.0]]
+    return [replace(base, advance=mu, height=h) for h in chosen.height or [None] for mu in speeds]
+
+
+def _refuse(chosen: argparse.Namespace, usual: dict, why: str) -> None:
+    """Raise InputError for an argument that is not as usual."""
+    from rotorjax.errors import InputError
+
+    for name, value in usual.items():
+        if getattr(chosen, name) != value:
+            raise InputError(f"Argument `{name}` must be left out, but is given: it {why}")
+
+
+def _wake(chosen: argparse.Namespace) -> int:
+    """Models of a rigid rotor's free wake in hover."""
     from tqdm import tqdm
 
     from rotorjax.bench.settings import study_settings
@@ -47,12 +143,14 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.linearisation import output
     from rotorjax.linearisation.run import Linearised, check, linearise_case, model_of
 
+    _only_the_wake(chosen)
     case = case_of(chosen)
     settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, quick=chosen.quick)
     check_case(case, settings)
     model = model_of(case, settings)
-    names = names_of(chosen.inputs), names_of(chosen.outputs)
-    check(model, *names, chosen.order, chosen.harmonics)
+    inputs = names_of("collective" if chosen.inputs is None else chosen.inputs)
+    outputs = names_of("CT,lambda0" if chosen.outputs is None else chosen.outputs)
+    check(model, inputs, outputs, chosen.order, chosen.harmonics)
     out = make_folder(chosen.out)  # before the work, not after it
     introduce(settings.rotor, settings.operating)
     with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
@@ -60,13 +158,29 @@ def run(chosen: argparse.Namespace) -> int:
         def progress(stage: str, residual: float) -> None:
             bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
 
-        found = linearise_case(model, *names, chosen.order, progress, harmonics=chosen.harmonics)
+        found = linearise_case(model, inputs, outputs, chosen.order, progress, harmonics=chosen.harmonics)
     if not isinstance(found, Linearised):
         write_json(out / "linearise.json", {"orbit": output.orbit(found)})
         print(f"{case.label}: not converged: {found.why}")
         return 1
     title = f"{settings.rotor.name}, collective {settings.collective_deg:g}°, {case.label}"
-    content = output.write(found, title, out)
+    content = output.write(found, title, out, chosen.time)
     print(output.lines(content))
     print(f"written: {out / 'report.md'}")
     return 0
+
+
+def _only_the_wake(chosen: argparse.Namespace) -> None:
+    """Raise InputError for what a wake of rigid blades does not have; one height is no list of them."""
+    from rotorjax.errors import InputError
+
+    usual = {"advance_ratio": None, "speed": None, "tilt": 0.0, "azimuths": None}
+    _refuse(chosen, usual, "needs a trim: give --thrust-coefficient or --weight")
+    if chosen.inflow not in (None, "freewake"):
+        raise InputError(
+            f"Argument `thrust_coefficient` or `weight` must be given with inflow '{chosen.inflow}', but neither is: "
+            "only the free wake of rigid blades is linearised at a collective"
+        )
+    if chosen.height is not None and len(chosen.height) > 1:
+        raise InputError("Argument `height` must be one without a thrust, but there are several")
+    chosen.height = None if chosen.height is None else chosen.height[0]

@@ -9,6 +9,7 @@ from rotorjax.bench import plotting
 from rotorjax.bench.markdown import table
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation import figures
+from rotorjax.linearisation.handover import Time, handed_over
 from rotorjax.linearisation.marching import STEPS
 from rotorjax.linearisation.reduce import HIGHEST, Small
 from rotorjax.linearisation.run import TOL, Linearised
@@ -17,15 +18,17 @@ from rotorjax.ode.export import save_mat, save_netcdf
 from rotorjax.wake.solution import Solution
 
 
-def write(found: Linearised, title: str, folder: str | Path) -> dict[str, Any]:
-    """Write every result into a folder that exists, and return the content of linearise.json.
+def write(found: Linearised, title: str, folder: str | Path, time: Time = "seconds") -> dict[str, Any]:
+    """Write every result into a folder that exists, and return the content of linearise.json. time: of the models.
 
     Raises InputError where the folder cannot be written.
     """
     folder = Path(folder)
     small = found.small
     models = {"full": found.periodic, "reduced_frequency": small.frequency.model, "reduced_time": small.time.model}
+    flown = found.solution.model
     for name, model in models.items():
+        model = handed_over(model, flown.rotor, flown.operating, time)
         save_netcdf(model, folder / f"{name}.nc")
         save_mat(model, folder / f"{name}.mat")
     plotting.save(figures.residuals(found.solution.residuals, TOL), folder / "residuals")

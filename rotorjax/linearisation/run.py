@@ -1,6 +1,5 @@
 """From a case to linear models: solve, linearise, find the spectrum, reduce, and march the same steps."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ from rotorjax.linearisation import figures
 from rotorjax.linearisation.assembly import assemble
 from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step, stable_steps
 from rotorjax.linearisation.reduce import Pair, reduce
+from rotorjax.linearisation.stages import Stages
 from rotorjax.linearisation.system import NODES, check_names, linear_wake, order_of, residual_of
 from rotorjax.linearisation.waves import Spectrum, spectrum
 from rotorjax.ode.harmonic import harmonic_model
@@ -92,7 +92,7 @@ def linearise_case(
     residual) is called as things go on. Raises InputError as `check` does.
     """
     check(model, inputs, outputs, order, harmonics)
-    clock, stages = Clock(), _Stages(progress)
+    clock, stages = Clock(), Stages(progress)
     found = (solver or solution.solve)(model, None, progress, TOL)
     stages.done("orbit")
     if not found.converged:
@@ -124,17 +124,3 @@ def march_error(full: LinearModel, marched: dict[str, Response]) -> Float[np.nda
         ours = STEPS[name] * step[:, :, m]
         error[:, m] = np.abs(ours - truth).max(axis=0) / np.abs(truth).max(axis=0)
     return error
-
-
-class _Stages:
-    """Wall time of each stage, shown as it ends."""
-
-    def __init__(self, progress: Progress | None):
-        self._progress, self._last = progress, time.perf_counter()
-        self.seconds: dict[str, float] = {}
-
-    def done(self, stage: str) -> None:
-        now = time.perf_counter()
-        self.seconds[stage], self._last = now - self._last, now
-        if self._progress is not None:
-            self._progress(f"{stage} done", 0.0)

@@ -35,7 +35,8 @@ def _fields(model: LinearModel | PeriodicModel) -> dict[str, np.ndarray]:
 
 
 def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
-    """Write A, B, C, D (times along the third axis where periodic, as in MATLAB), names and units to a .mat file.
+    """Write A, B, C, D (times along the third axis where periodic, as in MATLAB), what deviations are counted from (x0,
+    u0, y0), names, units, what time is and notes to a .mat file.
 
     Raises InputError where the folder does not exist or cannot be written.
     """
@@ -43,7 +44,10 @@ def save_mat(model: LinearModel | PeriodicModel, path: str | Path) -> Path:
     if isinstance(model, PeriodicModel):
         content = {key: np.moveaxis(value, 0, -1) for key, value in content.items()}
         content |= {"t": model.t, "period": model.period, "x": model.x.T, "u": model.u, "y": model.y.T}
-    for key in ("states", "inputs", "outputs", "input_units", "output_units"):
+    else:
+        content |= {"x0": model.x, "u0": model.u, "y0": model.y}
+    content |= {"time": model.time} | ({"notes": dict(model.notes)} if model.notes else {})
+    for key in ("states", "inputs", "outputs", "state_units", "input_units", "output_units"):
         content[key] = np.array(getattr(model, key), dtype=object)
     file = io.BytesIO()
     scipy.io.savemat(file, content)
@@ -68,13 +72,15 @@ def to_dataset(model: LinearModel | PeriodicModel) -> xr.Dataset:
         "output": list(model.outputs),
         "input_unit": ("input", list(model.input_units)),
         "output_unit": ("output", list(model.output_units)),
+        "state_unit": ("state", list(model.state_units)),
     }
-    attrs = {}
+    attrs = {"time": model.time, **model.notes}
     if isinstance(model, PeriodicModel):
         coords["time"] = model.t
-        coords["state_unit"] = ("state", list(model.state_units))
         data |= {"x": (("time", "state"), model.x), "y": (("time", "output"), model.y), "u": (("input",), model.u)}
         attrs["period"] = model.period
+    else:
+        data |= {"x0": (("state",), model.x), "u0": (("input",), model.u), "y0": (("output",), model.y)}
     return xr.Dataset(data, coords, attrs)
 
 

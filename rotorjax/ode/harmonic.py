@@ -61,6 +61,7 @@ def harmonic_model(
     x, x_rate, x_names = _basis(harmonics, model)
     u, _, u_names = _basis(input_harmonics, model)
     y, _, y_names = _basis(output_harmonics, model)
+    at_rest = {"x": (x, model.x), "u": (u, np.broadcast_to(model.u, (nodes, model.u.size))), "y": (y, model.y)}
     turning = _project(x, x_rate, np.broadcast_to(np.eye(model.order), model.a.shape))
     return LinearModel(
         a=_project(x, x, model.a) - turning,
@@ -72,6 +73,13 @@ def harmonic_model(
         outputs=_name(model.outputs, y_names),
         input_units=model.input_units * len(u_names),
         output_units=model.output_units * len(y_names),
+        state_units=model.state_units * len(x_names),
+        **{
+            name: _project(basis, np.ones((nodes, 1)), value[:, :, None])[:, 0]
+            for name, (basis, value) in at_rest.items()
+        },
+        time=model.time,
+        notes=model.notes,
     )
 
 

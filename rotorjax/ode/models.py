@@ -1,6 +1,7 @@
 """Linear state-space models with names and units: periodic in time, and time-invariant."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, cast
 
@@ -9,7 +10,12 @@ import scipy.linalg
 from jaxtyping import Complex, Float
 
 from rotorjax.errors import InputError
+from rotorjax.ode.fourier import fourier_interpolation
+from rotorjax.ode.labels import NO_UNIT
 from rotorjax.ode.threads import one_thread
+
+Notes = Mapping[str, float | str]
+AZIMUTH = "azimuth (rad)"
 
 
 @dataclass(frozen=True)
@@ -18,7 +24,7 @@ class PeriodicModel:
 
     t: (K,). period: time. a (K, n, n), b (K, n, m), c (K, q, n), d (K, q, m). states, inputs, outputs: names, with
     units in state_units, input_units, output_units. x (K, n), u (m,), y (K, q): what the model's deviations are
-    counted from.
+    counted from. time: what t counts. notes: what else a reader should know, by name.
     """
 
     t: Float[np.ndarray, " K"]
@@ -36,11 +42,20 @@ class PeriodicModel:
     x: Float[np.ndarray, "K n"]
     u: Float[np.ndarray, " m"]
     y: Float[np.ndarray, "K q"]
+    time: str = AZIMUTH
+    notes: Notes = field(default_factory=dict)
 
     @property
     def order(self) -> int:
         """Number of states."""
         return self.a.shape[-1]
+
+    def refined(self, nodes: int) -> "PeriodicModel":
+        """The model at another number of times from t[0] on, by trigonometric interpolation."""
+        angles = 2 * np.pi * np.arange(nodes) / nodes
+        table = fourier_interpolation(self.t.size, angles)
+        held = {name: np.tensordot(table, getattr(self, name), axes=1) for name in ("a", "b", "c", "d", "x", "y")}
+        return replace(self, t=self.t[0] + self.period * angles / (2 * np.pi), **held)
 
     def step(self, u: Float[np.ndarray, " m"], periods: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Times (N,) and output deviations (N, q) after the inputs step by u at t[0], over a number of periods.
@@ -95,7 +110,9 @@ class Resolvent:
 class LinearModel:
     """dx/dt = A x + B u, y = C x + D u.
 
-    a (n, n), b (n, m), c (q, n), d (q, m). states, inputs, outputs: names, with units in input_units, output_units.
+    a (n, n), b (n, m), c (q, n), d (q, m). states, inputs, outputs: names, with units in state_units, input_units,
+    output_units. x (n,), u (m,), y (q,): what deviations are counted from, zero where it is not given. time: what t
+    counts. notes: what else a reader should know, by name.
 
     Raises InputError where shapes or names do not fit together.
     """
@@ -109,10 +126,21 @@ class LinearModel:
     outputs: tuple[str, ...]
     input_units: tuple[str, ...]
     output_units: tuple[str, ...]
+    state_units: tuple[str, ...] = ()
+    x: Float[np.ndarray, " n"] = None  # type: ignore[assignment]  (zeros from here on)
+    u: Float[np.ndarray, " m"] = None  # type: ignore[assignment]
+    y: Float[np.ndarray, " q"] = None  # type: ignore[assignment]
+    time: str = AZIMUTH
+    notes: Notes = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check that matrices and names fit together."""
+        """Check that matrices and names fit together, and fill in what was not given."""
         n, m, q = len(self.states), len(self.inputs), len(self.outputs)
+        for name, size in {"x": n, "u": m, "y": q}.items():
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(size))
+        if not self.state_units:
+            object.__setattr__(self, "state_units", (NO_UNIT,) * n)
         for name, shape in {"a": (n, n), "b": (n, m), "c": (q, n), "d": (q, m)}.items():
             if getattr(self, name).shape != shape:
                 raise InputError(f"Argument `{name}` must have shape {shape}, but has {getattr(self, name).shape}")

@@ -1,6 +1,6 @@
 """Smaller linear models: residualised fast modes, balanced truncation (everywhere or in a band), measured error."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -9,6 +9,7 @@ import scipy.linalg
 from jaxtyping import Complex, Float
 
 from rotorjax.errors import InputError
+from rotorjax.ode.labels import NO_UNIT
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.threads import one_thread
 
@@ -26,9 +27,9 @@ class Reduced:
     singular: Float[np.ndarray, " k"]
 
 
-def _require_order(model: LinearModel, order: int, least: int = 1) -> None:
+def _require_order(model: LinearModel, order: int, least: int = 1, what: str = "unstable modes are kept") -> None:
     if not least <= order <= model.order:
-        why = "" if least == 1 else f" ({least} unstable modes are kept)"
+        why = "" if least == 1 else f" ({least} {what})"
         raise InputError(f"Argument `order` must lie in [{least}, {model.order}]{why}, but is {order}")
 
 
@@ -60,13 +61,16 @@ def _fold(model: LinearModel, keep: int, name: str) -> LinearModel:
         c=c[:, :keep] - c[:, keep:] @ fx,
         d=model.d - c[:, keep:] @ fu,
         states=tuple(f"{name}[{i}]" for i in range(keep)),
+        state_units=(),
+        x=model.x[:keep],
     )
 
 
 def _transform(model: LinearModel, v: np.ndarray, w: np.ndarray, name: str) -> LinearModel:
     """Model in coordinates z, x = V z, z = W x (fewer of them project)."""
     names = tuple(f"{name}[{i}]" for i in range(v.shape[1]))
-    return replace(model, a=w @ model.a @ v, b=w @ model.b, c=model.c @ v, states=names)
+    moved = {"a": w @ model.a @ v, "b": w @ model.b, "c": model.c @ v, "x": w @ model.x}
+    return replace(model, **moved, states=names, state_units=())
 
 
 @one_thread
@@ -182,6 +186,55 @@ def balance_in_band(
     right, left, singular = _balance(np.concatenate(reach / columns, axis=1), np.concatenate(see / rows, axis=1))
     keep = min(order, singular.size)
     return Reduced(_transform(model, right[:, :keep], left[:keep], "band"), None, singular)
+
+
+@one_thread
+def balance_rest(model: LinearModel, kept: Sequence[int], order: int, highest: float) -> Reduced:
+    """Keep some states as they are, first in the result, and balance the others as a system of their own.
+
+    Its inputs are the kept states and the model's own, its outputs what it does to both; each is weighted by how far
+    the whole model moves it up to the frequency `highest`, so that what comes back through the kept states counts. What
+    nothing moves drops out. order: of the whole. States left out follow at once, which keeps the response at frequency
+    0. Nothing bounds the error of the whole: measure it.
+
+    Raises InputError where `order` does not leave one of the others, or the others alone are not stable.
+    """
+    _require_order(model, order, len(kept) + 1, "states are kept as they are, and one of the others")
+    first, count = [*kept, *np.setdiff1d(np.arange(model.order), kept)], len(kept)
+    model = replace(
+        model, a=model.a[np.ix_(first, first)], b=model.b[first], c=model.c[:, first], x=model.x[first],
+        states=tuple(model.states[i] for i in first), state_units=tuple(model.state_units[i] for i in first),
+    )  # fmt: skip
+    a = model.a[count:, count:]
+    if np.linalg.eigvals(a).real.max() >= 0:
+        raise InputError("Argument `model` must be stable where the kept states are held, but grows")
+    reach, see, columns, rows = _sizes(model, highest)
+    b = np.concatenate([model.a[count:, :count] * reach[:count], model.b[count:] / columns], axis=1)
+    c = np.concatenate([model.a[:count, count:] * see[:count, None], model.c[:, count:] / rows[:, None]])
+    right, left, singular = _balance(
+        _root(scipy.linalg.solve_continuous_lyapunov(a, -b @ b.T)),
+        _root(scipy.linalg.solve_continuous_lyapunov(a.T, -c.T @ c)),
+    )
+    v, w = (np.asarray(scipy.linalg.block_diag(np.eye(count), part)) for part in (right, left))
+    small = _transform(model, v, w, "rest")
+    small = small if order >= small.order else _fold(small, order, "rest")
+    free = small.order - count
+    names = model.states[:count] + tuple(f"rest[{i}]" for i in range(free))
+    units = model.state_units[:count] + (NO_UNIT,) * free
+    return Reduced(replace(small, states=names, state_units=units), None, singular)
+
+
+def _sizes(model: LinearModel, highest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The most that evened inputs move each state (n,), and a push on its rate the evened outputs (n,), up to a
+    frequency; and the scales of inputs (m,) and outputs (q,) that even them.
+    """
+    points = 1j * np.geomspace(0.01, 1.0, 20) * highest
+    moved = [model.resolvent.solve(s, model.b) for s in points]
+    seen = [model.resolvent.solve(s, model.c.T, adjoint=True) for s in points]
+    rows, columns = _even(np.max([np.abs(model.c @ x + model.d) for x in moved], axis=0))
+    reach = np.max([np.abs(x / columns).max(axis=1) for x in moved], axis=0)
+    see = np.max([np.abs(y / rows).max(axis=1) for y in seen], axis=0)
+    return reach, see, columns, rows
 
 
 def bode_error_db(

@@ -45,6 +45,31 @@ def test_it_writes_everything(tmp_path, capsys):
     assert "| CT (-) | collective (rad) |" in (out / "report.md").read_text()
 
 
+def test_a_trimmed_rotor_at_one_speed_and_over_two(tmp_path, capsys):
+    line = ["linearise", "--weight", "72000", "--inflow", "uniform", "--azimuths", "16", "--inputs", "theta_0,w"]
+    line += ["--outputs", "CT,Z,beta_0,lambda_0", "--order", "13"]
+    assert main([*line, "--advance-ratio", "0.1", "--out", str(tmp_path / "one")]) == 0
+    assert main([*line, "--speed", "0", "20", "--time", "azimuth", "--out", str(tmp_path / "two")]) == 0
+    assert "coning" in capsys.readouterr().out
+    files = {f"{name}.{end}" for name in ("reduced", "full", "periodic") for end in ("mat", "nc")}
+    files |= {"README.md", "report.md", "linearise.json", "roots.png", "roots.pdf"}
+    assert {path.name for path in (tmp_path / "one").iterdir()} == files
+    found = json.loads((tmp_path / "one" / "linearise.json").read_text())
+    model = scipy.io.loadmat(tmp_path / "one" / "full.mat", simplify_cells=True)
+    # seconds: the same poles, Ω times as fast; forces in newtons
+    poles = np.linalg.eigvals(model["A"]) / found["omega_rad_s"]
+    coning = next(mode for mode in found["modes"] if mode["name"] == "coning")
+    assert np.abs(poles - (coning["growth"] + 1j * coning["frequency"])).min() < 0.03
+    assert model["time"] == "seconds"
+    assert list(model["output_units"]) == ["-", "N", "rad", "m/s"]
+    assert model["y0"][1] == pytest.approx(-72000, rel=0.1)
+    assert "theta_0" in (tmp_path / "one" / "README.md").read_text()
+    stitched = netcdf.read(tmp_path / "two" / "scheduled.nc")
+    assert stitched.sizes["flight"] == 2
+    assert np.isfinite(stitched.growth.sel(mode="coning")).all()
+    assert stitched.attrs["time"] == "azimuth (rad)"
+
+
 def test_a_wake_that_is_lost_gives_exit_code_1(tmp_path, monkeypatch, capsys):
     def lost(model, start, progress, tol):
         return replace(made_up(model), converged=False, why="made up to fail")
@@ -67,6 +92,10 @@ BAD = {
     "--slope 5": "`height` must be given",
     "--height 1 --climb 0.01": "`climb` must be 0 over ground",
     "--order x": "invalid int value: 'x'",
+    "--advance-ratio 0.1": "`advance_ratio` must be left out",
+    "--inflow vpbfsm": "`thrust_coefficient` or `weight` must be given",
+    "--height 1 2": "`height` must be one",
+    "--thrust-coefficient 0.005": "`quick` must be left out",
 }
 
 

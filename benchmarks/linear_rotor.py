@@ -1,0 +1,130 @@
+"""The linear rotor: what it costs and how true it is, for the UH-60 at C_T = .00575.
+
+Prints, for each inflow and flight:
+1. seconds from a trim to the periodic model, the first time (compiling) and again, and to modes and a reduced model;
+2. the reduced model against the periodic one's harmonic-0 transfer function up to 2/rev, dB and degrees, for θ₀ → C_T,
+   θ₁c → β₁s, w → C_T and q → M;
+3. the periodic model against the nonlinear march over a revolution, steps of θ₀, θ₁c, w, q and height, in % of the
+   response's largest value: worst over C_T, L, M, blades' flap and inflow, and over every output;
+4. exponents by design parameters against central differences, relative to the largest.
+
+    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--json FILE]
+"""
+
+import argparse
+import json
+import time
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from rotorjax.linearisation import flight, rotor, steps
+from rotorjax.linearisation.compact import compact, frequencies
+from rotorjax.linearisation.modes import modes
+from rotorjax.linearisation.sensitivity import sensitivity
+from rotorjax.ode.harmonic import average
+from rotorjax.ode.hill import harmonic_transfer
+from rotorjax.trim.run import request, run
+from rotorjax.trim.solve import trim
+
+THRUST = 0.00575
+FLIGHTS = {"hover": {}, "h = 1": {"height": 1.0}, "μ = .15": {"advance": 0.15}, "μ = .3": {"advance": 0.3}}
+STEPPED = ("theta_0", "theta_1c", "w", "q")
+PAIRS = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"))
+MAIN = ("CT", "L", "M", "beta_0", "beta_1c", "beta_1s", "lambda_0", "lambda_1c", "lambda_1s")
+PARAMETERS = {
+    "hinge offset": (lambda design: design[1].blade.offset, 1e-5),
+    "density over inertia": (lambda design: design[1].blade.air, 1e-4),
+    "thrust": (lambda design: design[0].thrust, 1e-7),
+}
+
+
+def timed(call):
+    """Result and seconds of a call."""
+    begin = time.perf_counter()
+    found = call()
+    return found, time.perf_counter() - begin
+
+
+def row(inflow, name, order):
+    """One flight."""
+    result, trim_s = timed(lambda: run(request("uh60", THRUST, inflow, **FLIGHTS[name])))
+    base = rotor.base_of(result.trimmed)
+    _, first_s = timed(lambda: rotor.linear_rotor(base, flight.CONTROLS, flight.OUTPUTS))
+    model, again_s = timed(lambda: rotor.linear_rotor(base, flight.CONTROLS, flight.OUTPUTS))
+    truth = harmonic_transfer(model, frequencies())[:, 0]
+    found, modes_s = timed(lambda: modes(model))
+    small, reduce_s = timed(lambda: compact(average(model), order, truth))
+    where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
+    names = STEPPED + (("height",) if result.request.height else ())
+    stepped = rotor.linear_rotor(base, names, flight.OUTPUTS)
+    sizes = [steps.size_of(n) for n in names]
+    error = steps.largest_gap(steps.marched(base, names, stepped.outputs), steps.modelled(stepped, sizes))
+    main = [stepped.outputs.index(n) for n in MAIN]
+    return result, {
+        "inflow": inflow,
+        "flight": name,
+        "converged": result.converged,
+        "states": model.order,
+        "trim_s": trim_s,
+        "linear_first_s": first_s,
+        "linear_again_s": again_s,
+        "modes_s": modes_s,
+        "reduce_s": reduce_s,
+        "reduced_order": small.model.order,
+        "unstable": small.unstable,
+        "gap_db": {k: float(small.gap_db[v]) for k, v in where.items()},
+        "gap_deg": {k: float(small.gap_deg[v]) for k, v in where.items()},
+        "step_error_main": {n: float(error[main, m].max()) for m, n in enumerate(names)},
+        "step_error_all": {n: float(error[:, m].max()) for m, n in enumerate(names)},
+        "worst_step": {n: stepped.outputs[int(np.argmax(error[:, m]))] for m, n in enumerate(names)},
+        "modes": {m.name: [m.exponent.real, m.exponent.imag] for m in found},
+    }
+
+
+def derivatives(trimmed):
+    """Largest gap of the exponents' derivatives from central differences, over the largest derivative."""
+    gaps = {}
+    for name, (where, step) in PARAMETERS.items():
+        found, ends = sensitivity(trimmed, where), []
+        for change in (step, -step):
+            design = (trimmed.flight, trimmed.p)
+            condition, p = eqx.tree_at(where, design, where(design) + change)
+            end = sensitivity(trim(p, condition, trimmed.residual, trimmed.z), where).exponents
+            ends.append(np.array([end[np.argmin(np.abs(end - v))] for v in found.exponents]))
+        slopes = (ends[0] - ends[1]) / (2 * step)
+        gaps[name] = float(np.abs(slopes - found.exponents_by).max() / np.abs(slopes).max())
+    return gaps
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--inflow", nargs="+", default=["pitt-peters"])
+    parser.add_argument("--order", type=int, default=20)
+    parser.add_argument("--json", help="file to write")
+    chosen = parser.parse_args()
+    jax.config.update("jax_enable_x64", True)
+    rows, found = [], {}
+    for inflow in chosen.inflow:
+        for name in FLIGHTS:
+            result, one = row(inflow, name, chosen.order)
+            rows.append(one)
+            print(
+                f"{inflow}, {name}: {one['states']} states; linear {one['linear_first_s']:.1f} s first, "
+                f"{one['linear_again_s']:.2f} s again; modes {one['modes_s']:.2f} s; to {one['reduced_order']} states "
+                f"{one['reduce_s']:.2f} s, {one['unstable']} unstable"
+            )
+            print("  reduced:", ", ".join(f"{k} {v:.2f} dB {one['gap_deg'][k]:.1f}°" for k, v in one["gap_db"].items()))
+            for text, key in (("main", "step_error_main"), ("all", "step_error_all")):
+                print(f"  steps, {text}:", ", ".join(f"{k} {100 * v:.2f} %" for k, v in one[key].items()))
+            if inflow == "pitt-peters" and name in ("hover", "μ = .15"):
+                found[name] = derivatives(result.trimmed)
+                print("  derivatives:", ", ".join(f"{k} {v:.0e}" for k, v in found[name].items()), flush=True)
+    if chosen.json:
+        with open(chosen.json, "w") as file:
+            json.dump({"flights": rows, "derivatives": found}, file, indent=1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,103 @@
+"""Modes of a linear rotor by name: coning, regressing and progressing flap and lag, inflow; who takes part in each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rotorjax.ode.hill import Exponents, exponents
+from rotorjax.ode.models import PeriodicModel
+
+FAMILIES = {"beta": "flap", "lag": "lag"}
+"""By the first part of a state's name; all others are the inflow's."""
+TELLING = 0.02
+"""Participation from which on a state is told."""
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode, or a complex pair of them by the one of positive frequency. name: unique in its model. exponent: growth +
+    i frequency per unit of time, as seen from the hub. shares: participation of the families. states: those of the
+    leading ones.
+    """
+
+    name: str
+    exponent: complex
+    shares: dict[str, float]
+    states: dict[str, float]
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio."""
+        return -self.exponent.real / abs(self.exponent) if self.exponent else 0.0
+
+
+def modes(model: PeriodicModel) -> tuple[Mode, ...]:
+    """All modes of a rotor's model, the least damped first."""
+    return named(exponents(model), model.states)
+
+
+def named(found: Exponents, states: tuple[str, ...]) -> tuple[Mode, ...]:
+    """Name exponents by what takes part in them: a complex pair is one mode."""
+    shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
+    families = [_family(state) for state in states]
+    chosen = []
+    for k in shown:
+        part = found.participation[:, k]
+        inside = {family: np.array([one == family for one in families]) for family in dict.fromkeys(families)}
+        shares = {family: float(part[members].sum()) for family, members in inside.items()}
+        family = max(shares, key=lambda name: shares[name])
+        own = np.where(inside[family], part, 0.0)
+        coordinate = _coordinate(states, own) if family != "inflow" else states[int(np.argmax(own))]
+        turns = abs(found.values[k].imag) > 1e-9 * (1 + abs(found.values[k]))
+        value = complex(found.values[k]) if turns else complex(found.values[k].real)
+        chosen.append((family, coordinate, value, shares, part))
+    names = _names([(family, coordinate, value) for family, coordinate, value, _, _ in chosen])
+    return tuple(
+        Mode(name, value, shares, {states[i]: float(part[i]) for i in np.argsort(-part) if part[i] > TELLING})
+        for name, (_, _, value, shares, part) in zip(names, chosen, strict=True)
+    )
+
+
+def _family(state: str) -> str:
+    return FAMILIES.get(state.partition("_")[0], "inflow")
+
+
+def _coordinate(states: tuple[str, ...], part: np.ndarray) -> str:
+    """The multi-blade coordinate, 0, 1, 2 … or D, that takes part most; cosine and sine go together."""
+    totals: dict[str, float] = {}
+    for state, weight in zip(states, part, strict=True):
+        if weight:
+            key = state.split("_")[1].rstrip("cs")
+            totals[key] = totals.get(key, 0.0) + float(weight)
+    return max(totals, key=lambda key: totals[key])
+
+
+def _names(found: list[tuple[str, str, complex]]) -> list[str]:
+    """Regressing is the slower of two cyclic modes; more modes of one kind are counted."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for k, (family, coordinate, _) in enumerate(found):
+        groups.setdefault((family, coordinate), []).append(k)
+    names = [""] * len(found)
+    for (family, coordinate), members in groups.items():
+        slowest_first = sorted(members, key=lambda k: (abs(found[k][2].imag), -found[k][2].real))
+        for place, k in enumerate(slowest_first):
+            names[k] = _name(family, coordinate, place, len(members), found[k][2].imag != 0)
+    return [_counted(name, names[:k]) for k, name in enumerate(names)]
+
+
+def _name(family: str, coordinate: str, place: int, count: int, turns: bool) -> str:
+    if family == "inflow":
+        return f"inflow {coordinate}"
+    if coordinate == "0":
+        return "coning" if family == "flap" else "collective lag"
+    if coordinate == "D":
+        return f"differential {family}"
+    order = "" if coordinate == "1" else f" {coordinate}"
+    if count > 2 and not turns:
+        return f"regressing {family}{order}"
+    return f"{'progressing' if place == count - 1 and count > 1 else 'regressing'} {family}{order}"
+
+
+def _counted(name: str, before: list[str]) -> str:
+    number = before.count(name) + 1
+    return name if number == 1 else f"{name} ({number})"
