@@ -27,7 +27,7 @@ from rotorjax.potential.model import (
     mean_inflow,
 )
 
-GRID_R = np.linspace(0.0, 1.0, 64)  # 64 × 72 points of the disk for pictures
+GRID_R = np.linspace(0.0, 1 - 1e-6, 64)  # 64 × 72 points for pictures: on the rim rounding says what is the disk
 GRID_PSI = np.linspace(0.0, 2 * np.pi, 72, endpoint=False)
 DIAMETER_PSI = np.array([0.0, np.pi])  # mountain side, valley side
 PATCH = DiskQuadrature(48, 64)  # of the exact image's source patch on a slope

@@ -24,7 +24,7 @@ def solver(monkeypatch):
 def test_one_case_writes_everything(tmp_path, solver, capsys):
     out = tmp_path / "out"
     assert main(["validate", "--out", str(out), "--quick", "--case", "momentum"]) == 1  # made up: no momentum theory
-    names = {"validation.json", "validation.md", "momentum.png", "momentum.pdf"}
+    names = {"validation.json", "validation.md", "validation.html", "momentum.png", "momentum.pdf"}
     assert {p.name for p in out.iterdir()} == names
     found = json.loads((out / "validation.json").read_text())
     verdicts = [row["verdict"] for row in found["rows"]]
