@@ -105,8 +105,9 @@ def damper_moment(blade: Blade, lag_rate: Float[Array, ""]) -> Float[Array, ""]:
     """Moment of the lag damper against a lag rate (over Ω), over IΩ²; beyond the table as its last piece goes on."""
     if blade.damper_rate is None or blade.damper_force is None:
         return jnp.zeros_like(lag_rate)
-    axial = blade.damper_arm * lag_rate
-    return blade.damper_arm * jnp.interp(axial, blade.damper_rate, blade.damper_force, "extrapolate", "extrapolate")
+    axial = blade.damper_arm * jnp.stack([lag_rate, -lag_rate])  # half of a difference is odd to the last bit
+    there, back = jnp.interp(axial, blade.damper_rate, blade.damper_force, "extrapolate", "extrapolate")
+    return blade.damper_arm * 0.5 * (there - back)
 
 
 def direction(q: Float[Array, "2"]) -> Float[Array, "3"]:

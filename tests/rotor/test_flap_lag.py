@@ -135,8 +135,7 @@ def test_damper_is_the_table_at_its_arm(blade):
     rate = 0.00508 / arm / omega  # the table's third row: 1023.09 N at 0.00508 m/s
     moment = float(damper_moment(blade, jnp.asarray(rate))) * float(rotor.hinge.flap_inertia) * omega**2
     assert moment == pytest.approx(1023.09 * arm, rel=1e-12)
-    there, back = (float(damper_moment(blade, jnp.asarray(sign * rate))) for sign in (1, -1))
-    assert back == pytest.approx(-there, rel=1e-15)
+    assert float(damper_moment(blade, jnp.asarray(-rate))) == -float(damper_moment(blade, jnp.asarray(rate)))
 
 
 def test_derivatives_agree_with_differences(free):
