@@ -96,9 +96,19 @@ def harmonic_change(before: Solution, after: Solution, field: Callable[[Solution
 
 
 def draw(subject: Subject, wakes: Wakes) -> Figure:
-    """Change of C_T and mean inflow by each refinement; the first harmonic of inflow over slope, with both."""
+    """Change of C_T and mean inflow by each refinement; the first harmonic of inflow over slope, with both.
+
+    What did not converge has its name and no bar or point.
+    """
     found = pairs(subject)
-    names = [f"{f.label}".replace(", ", "\n", 1) for _, f in found]
+    names = [f.label.replace(", ", "\n", 1) + ("" if wakes[f].converged else "\nnot converged") for _, f in found]
+
+    def read(at: Point, of: Callable[[Solution], float]) -> float:
+        return of(wakes[at]) if wakes[at].converged else np.nan
+
+    def first(wake: Solution) -> float:
+        return abs(first_harmonic(wake, wake.inflow)) / wake.mean_inflow
+
     with style():
         figure = new_figure(12.0, 4.6)
         axes, slopes = figure.subplots(1, 2, width_ratios=(3, 1))
@@ -108,7 +118,7 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
             (-0.2, FREE_WAKE, r"$C_T$", lambda s: s.CT),
             (0.2, VPBFSM, "mean inflow", lambda s: s.mean_inflow),
         ):
-            changes = [100 * (of(wakes[f]) / of(wakes[b]) - 1) for b, f in found]
+            changes = [100 * (read(f, of) / read(b, of) - 1) for b, f in found]
             axes.bar(at + shift, changes, 0.4, color=colour, zorder=3, label=label)
         axes.axhline(0, color=INK, lw=0.8)
         axes.set_xticks(at, names, rotation=60, ha="right", fontsize=6)
@@ -116,7 +126,7 @@ def draw(subject: Subject, wakes: Wakes) -> Figure:
         axes.legend(loc="best")
         for k, colour in ((0, FREE_WAKE), (1, VPBFSM)):
             sloped = [pair[k] for pair in found if pair[0].slope_deg]
-            size = [abs(first_harmonic(wakes[p], wakes[p].inflow)) / wakes[p].mean_inflow for p in sloped]
+            size = [read(p, first) for p in sloped]
             slopes.plot([p.slope_deg for p in sloped], size, "o-", color=colour, label=("default", "refined")[k])
         slopes.set(xlabel="slope, deg", ylabel="first harmonic of inflow over its mean")
         slopes.legend(loc="best")

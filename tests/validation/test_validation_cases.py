@@ -102,6 +102,21 @@ def test_a_wake_that_fails_takes_out_the_rows_that_are_read_from_it(coarse_hover
     assert met == {"free alone": True, "both": False, "of the case": False}
 
 
+def test_a_wake_that_fails_has_no_bar(coarse_hover):
+    subject = Subject()
+    lost = point("uh60", None, 0.5, free_turns=grid.refined(False)["free_turns"])
+    tasks = grid.points(subject)
+    assert lost in tasks
+    figure = grid.draw(subject, {at: replace(coarse_hover, converged=at != lost) for at in tasks})
+    axes = figure.axes[0]
+    names = [label.get_text() for label in axes.get_xticklabels()]
+    at = next(k for k, (_, finer) in enumerate(grid.pairs(subject)) if finer == lost)
+    assert [k for k, name in enumerate(names) if name.endswith("not converged")] == [at]
+    for bars in axes.containers:
+        missing = [k for k, bar in enumerate(bars) if np.isnan(bar.get_height())]
+        assert missing == [at]
+
+
 READ_FROM = {
     "free alone": ("uh60 18°, OGE",),
     "both": ("uh60 18°, OGE", "uh60 18°, h = 0.5, free_turns 4"),
