@@ -29,7 +29,7 @@
 Height is counted under the hub, the pitch turns the deck about that point.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -40,6 +40,7 @@ from scipy.interpolate import PchipInterpolator
 from rotorjax.checks import Range
 from rotorjax.errors import ArgumentError, InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
+from rotorjax.limits import check_axial, check_place
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.moving_ground import Variant, require_clear, require_increasing
 from rotorjax.rotor.catalogue import load
@@ -188,6 +189,21 @@ def _check(case: DeckCase) -> None:
         raise ArgumentError("time.duration", f"need at most {_MOST_STEPS} steps", f"{case.duration:g} s: {psi.size}")
     motion = case.motion(psi)
     require_clear(motion["height"], motion["slope"])  # type: ignore[arg-type]
+    _check_theory(case, psi / case.omega, motion)
+
+
+def _check_theory(case: DeckCase, t: Float[np.ndarray, " T"], motion: dict[str, Float[np.ndarray, " T"]]) -> None:
+    """Refuse what the finite states do not know: a hub or a rim too low, a descent into the vortex ring state."""
+    height, slope, climb = motion["height"], np.abs(motion["slope"]), motion["climb"]
+    rim = height * np.cos(slope) - np.sin(slope)
+    tip_speed = case.omega * float(case.rotor.radius)
+    for i in {int(np.argmin(v)) for v in (height, rim, climb)} | {int(np.argmax(climb))}:
+        flown = replace(case.operating, collective=np.float64(case.collective), climb=climb[i] * tip_speed)
+        try:
+            check_place("vpbfsm", float(height[i]), float(np.rad2deg(slope[i])))
+            check_axial("vpbfsm", case.rotor, flown)
+        except InputError as error:
+            raise InputError(f"[path] and [deck], at {t[i]:.4g} s: {error}") from None
 
 
 def _rigid(value: object, rotor: Rotor) -> bool:
