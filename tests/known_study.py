@@ -1,6 +1,7 @@
 """A small study whose free wake is the finite-state model itself with known corrections: the fit must find them."""
 
 import json
+from functools import cache
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,6 +23,7 @@ REFERENCE = 0.06
 R, PSI = np.linspace(0.2, 0.98, 9), 2 * np.pi / 8 * np.arange(8)
 
 
+@cache  # not to be written into
 def known_study(noise: float = 0.0) -> xr.Dataset:
     """cases.nc as a study writes it, as far as a calibration reads it."""
     cases = study_cases((0.5, 0.75, 1.0, 1.5, 2.0), (10.0, 20.0, 30.0))
