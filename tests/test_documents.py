@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -11,11 +12,17 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
+from rotorjax import cli
+
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```(sh|python)\n(.*?)```", README, re.DOTALL)
 STUDY, TESTS, INFLOW, PYTHON = (text for _, text in BLOCKS)
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+EXECUTED = ROOT / "build" / "notebooks"  # where the site finds them (docs/hooks.py)
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
+PYTHON_BLOCK = re.compile(r"(?:<!-- not run: (.+) -->\n)?```python\n(.*?)```", re.DOTALL)
+COMMAND = re.compile(r"^(?:\.venv/bin/)?rotorjax (.*)$", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +87,40 @@ def test_notebook_runs(path, studied, tmp_path):
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
     client.execute()
+    EXECUTED.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, EXECUTED / path.name)
     pictures = [o for cell in notebook.cells for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
     assert pictures
     assert not any(cell.get("outputs") for cell in nbformat.read(path, as_version=4).cells)  # kept small
+
+
+def run_blocks(page):
+    """The Python blocks of a page that are to be run, as one text."""
+    return "".join(text for not_run, text in PYTHON_BLOCK.findall(page.read_text()) if not not_run)
+
+
+@pytest.fixture(scope="module")
+def own_rotor(tmp_path_factory):
+    """A folder with what `rotorjax new rotor mine` writes."""
+    folder = tmp_path_factory.mktemp("own")
+    assert cli.main(["new", "rotor", str(folder / "mine")]) == 0
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if run_blocks(p)], ids=lambda p: p.stem)
+def test_code_of_the_site_runs(page, own_rotor, monkeypatch, capsys):
+    """Blocks of a page one after the other, as a reader would copy them; those marked "not run" say why."""
+    monkeypatch.chdir(own_rotor)
+    exec(compile(run_blocks(page), str(page), "exec"), {})
+    assert "nan" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda p: p.stem)
+def test_commands_of_the_documents_are_commands(page):
+    text = page.read_text()
+    for line in COMMAND.findall("".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))):
+        cli.parsed(shlex.split(line))
 
 
 def test_python_example(clone):
