@@ -20,13 +20,13 @@ def scripts():
 
 def figure_of(path):
     """The `figure` that a script leaves."""
+    import matplotlib as mpl
+
     from rotorjax.bench.plotting import style
 
     found = {}
-    with style():
+    with style(), mpl.rc_context({"figure.constrained_layout.use": True}):
         exec(compile(path.read_text(), str(path), "exec"), found)
-        if found["figure"].get_layout_engine() is None:
-            found["figure"].set_layout_engine("constrained")
         found["figure"].draw_without_rendering()
     return found["figure"]
 
