@@ -1,4 +1,4 @@
-"""What the site asks of mkdocs beyond its plugins: notebooks as pages, formulas as MathML, docstrings' examples as code.
+"""What the site asks of mkdocs beyond its plugins: notebooks as pages, formulas as MathML, examples as code.
 
 Nothing is fetched by the finished pages. Notebooks are shown with their outputs: those that the tests wrote to
 `build/notebooks` if their cells are still the same, else they run here once (some minutes).
@@ -107,8 +107,7 @@ def page_of(notebook, name):
             parts.append(cell.source)
             continue
         parts.append(f"```python\n{cell.source}\n```")
-        for output in cell.get("outputs", ()):
-            parts.append(_shown(output, name, pictures))
+        parts += [_shown(output, name, pictures) for output in cell.get("outputs", ())]
     where = f"*This page is [notebooks/{name}.ipynb]({name}.ipynb), run from top to bottom.*"
     pictures[f"{name}.ipynb"] = nbformat.writes(_bare(notebook)).encode()
     head, *rest = [part for part in parts if part]

@@ -18,12 +18,14 @@ from rotorjax.ode.export import save_mat as save_mat
 from rotorjax.ode.export import to_control as to_control
 from rotorjax.operating import OperatingPoint as OperatingPoint
 from rotorjax.operating import operating_point as operating_point
-from rotorjax.potential.model import steady_state as steady
+from rotorjax.potential.model import steady_state
 from rotorjax.rotor.catalogue import names as names
-from rotorjax.rotor.geometry import rotor as make_rotor
+from rotorjax.rotor.geometry import rotor as _rotor
 from rotorjax.wake.model import free_wake as free_wake
 from rotorjax.wake.settings import WakeSettings as WakeSettings
 from rotorjax.wake.settings import flight_settings as flight_settings
 from rotorjax.wake.settings import quick_settings as quick_settings
 
 __version__: str
+make_rotor = _rotor
+steady = steady_state

@@ -185,7 +185,7 @@ def test_every_page_is_in_the_navigation():
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """The documentation, built strictly: a broken link, anchor or name is a failure. Notebooks as the tests left them."""
+    """The documentation, built strictly: a broken link or name is a failure. Notebooks as the tests left them."""
     folder = tmp_path_factory.mktemp("docs") / "site"
     env = os.environ | {"ROTORJAX_DOCS_EXECUTE": "0", "NO_MKDOCS_2_WARNING": "1"}
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]

@@ -1,5 +1,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
+
 import rotorjax as rj
 from rotorjax.trim.problem import outputs_at
 

@@ -1,7 +1,7 @@
 import matplotlib.pyplot as plt
-import numpy as np
+
 from rotorjax.calibration import hayden
-from rotorjax.reference.published import cheeseman_bennett, isolated_rotors
+from rotorjax.reference.published import cheeseman_bennett
 
 data, _ = hayden.hayden_data((0.5, 0.75, 1.0, 1.5, 2.0, 3.0))
 figure, axes = plt.subplots()

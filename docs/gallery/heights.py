@@ -1,4 +1,5 @@
 import matplotlib.pyplot as plt
+
 import rotorjax as rj
 
 uh60, hover = rj.rotor("uh60", collective_deg=18.0)

@@ -1,5 +1,7 @@
 from dataclasses import replace
+
 import matplotlib.pyplot as plt
+
 import rotorjax as rj
 
 march = rj.march(rj.trim(*rj.rotor("uh60"), 0.00575, inflow="pitt-peters", advance=0.15), precision="double")

@@ -1,4 +1,5 @@
 import matplotlib.pyplot as plt
+
 import rotorjax as rj
 
 speeds = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)

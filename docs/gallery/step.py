@@ -1,5 +1,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
+
 import rotorjax as rj
 
 level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="pitt-peters", advance=0.15)

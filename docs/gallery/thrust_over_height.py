@@ -1,6 +1,7 @@
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
+
 import rotorjax as rj
 
 uh60, hover = rj.rotor("uh60", collective_deg=18.0)

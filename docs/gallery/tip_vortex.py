@@ -1,5 +1,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
+
 import rotorjax as rj
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.4))

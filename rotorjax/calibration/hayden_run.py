@@ -122,8 +122,8 @@ def record(result: HaydenRun) -> dict[str, Any]:
         "drivers": {n: {"parameters": f.parameters.table(f.values), "rms_error": f.rms, "converged": f.converged}
                     for n, f in result.fits.items()},
         "largest_difference_of_drivers": result.disagreement,
-        "starts": {"count": result.many.converged.size, "converged": int(result.many.converged.sum()), "spread": result.spread,
-                   "wall_time_s": result.many.wall_time_s},
+        "starts": {"count": result.many.converged.size, "converged": int(result.many.converged.sum()),
+                   "spread": result.spread, "wall_time_s": result.many.wall_time_s},
         "wall_time_s": result.wall_time_s,
         "compile_time_s": result.compile_time_s,
     }  # fmt: skip
@@ -148,8 +148,8 @@ def report(result: HaydenRun) -> str:
     lines += [
         f"{'rms':>6}{'':>10}{fit.rms:10.4f}{result.printed_rms:16.4f}",
         "",
-        f"drivers agree to {result.disagreement:.1e}; {int(result.many.converged.sum())} of {result.many.converged.size} starts converge, "
-        f"within {result.spread:.1e}",
+        f"drivers agree to {result.disagreement:.1e}; {int(result.many.converged.sum())} of "
+        f"{result.many.converged.size} starts converge, within {result.spread:.1e}",
         ("converged: " if fit.converged else "NOT CONVERGED: ") + fit.why,
         f"{result.wall_time_s:.1f} s, compiling {result.compile_time_s:.1f} s",
     ]
