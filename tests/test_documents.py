@@ -99,8 +99,9 @@ def test_notebook_runs(path, studied, tmp_path):
 
 
 def run_blocks(page):
-    """The Python blocks of a page that are to be run, as one text."""
-    return "".join(text for not_run, text in PYTHON_BLOCK.findall(page.read_text()) if not not_run)
+    """The Python blocks of a page that are to be run, as one text; the gallery's are scripts of their own."""
+    blocks = PYTHON_BLOCK.findall(page.read_text())
+    return "".join(text for not_run, text in blocks if not not_run and not text.startswith("--8<--"))
 
 
 @pytest.fixture(scope="module")
