@@ -1,21 +1,32 @@
 """Every code block of the README does what it says, in a fresh copy of the repository; every notebook runs."""
 
+import importlib.util
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import nbformat
 import pytest
+from browser import needs_browser, seen
 from nbclient import NotebookClient
+
+import rotorjax as rj
+from rotorjax import cli
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```(sh|python)\n(.*?)```", README, re.DOTALL)
 STUDY, TESTS, INFLOW, PYTHON = (text for _, text in BLOCKS)
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+EXECUTED = ROOT / "build" / "notebooks"  # where the site finds them (docs/hooks.py)
+PAGES = sorted((ROOT / "docs").rglob("*.md"))
+PYTHON_BLOCK = re.compile(r"(?:<!-- not run: (.+) -->\n)?```python\n(.*?)```", re.DOTALL)
+COMMAND = re.compile(r"^(?:\.venv/bin/)?rotorjax (.*)$", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +91,41 @@ def test_notebook_runs(path, studied, tmp_path):
     notebook = nbformat.read(path, as_version=4)
     client = NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
     client.execute()
+    EXECUTED.mkdir(parents=True, exist_ok=True)
+    nbformat.write(notebook, EXECUTED / path.name)
     pictures = [o for cell in notebook.cells for o in cell.get("outputs", []) if "image/png" in o.get("data", {})]
     assert pictures
     assert not any(cell.get("outputs") for cell in nbformat.read(path, as_version=4).cells)  # kept small
+
+
+def run_blocks(page):
+    """The Python blocks of a page that are to be run, as one text; the gallery's are scripts of their own."""
+    blocks = PYTHON_BLOCK.findall(page.read_text())
+    return "".join(text for not_run, text in blocks if not not_run and not text.startswith("--8<--"))
+
+
+@pytest.fixture(scope="module")
+def own_rotor(tmp_path_factory):
+    """A folder with what `rotorjax new rotor mine` writes."""
+    folder = tmp_path_factory.mktemp("own")
+    assert cli.main(["new", "rotor", str(folder / "mine")]) == 0
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if run_blocks(p)], ids=lambda p: p.stem)
+def test_code_of_the_site_runs(page, own_rotor, monkeypatch, capsys):
+    """Blocks of a page one after the other, as a reader would copy them; those marked "not run" say why."""
+    monkeypatch.chdir(own_rotor)
+    exec(compile(run_blocks(page), str(page), "exec"), {})
+    assert "nan" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda p: p.stem)
+def test_commands_of_the_documents_are_commands(page):
+    text = page.read_text()
+    for line in COMMAND.findall("".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))):
+        cli.parsed(shlex.split(line))
 
 
 def test_python_example(clone):
@@ -95,3 +138,76 @@ def test_python_example(clone):
 def test_files_that_the_readme_names_exist():
     for name in re.findall(r"`((?:notebooks|rotorjax)/[\w./]+)`|\]\((docs/[\w.]+)\)", README):
         assert (ROOT / (name[0] or name[1])).exists(), name
+
+
+def lines_of(script):
+    """The lines that do something: neither blank nor an import."""
+    return [line for line in script.read_text().splitlines() if line and not line.startswith(("import ", "from "))]
+
+
+def test_the_gallery_is_whole():
+    """Every script has its picture and its place, in ten lines and sixty kilobytes."""
+    folder = ROOT / "docs" / "gallery"
+    scripts = [path for path in folder.glob("*.py") if path.name != "run.py"]
+    page = (folder / "index.md").read_text()
+    assert 12 <= len(scripts) <= 20
+    assert {path.stem for path in scripts} == {path.stem for path in folder.glob("*.webp")}
+    for script in scripts:
+        assert len(lines_of(script)) <= 10, script
+        assert (folder / f"{script.stem}.webp").stat().st_size <= 60_000
+        assert f'"docs/gallery/{script.name}"' in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["blade", "airfoil", "heights"])
+@pytest.mark.filterwarnings("ignore:FigureCanvasAgg is non-interactive")
+def test_a_picture_of_the_gallery_is_drawn(name):
+    """The cheapest; all of them by `python docs/gallery/run.py`."""
+    spec = importlib.util.spec_from_file_location("gallery", ROOT / "docs" / "gallery" / "run.py")
+    gallery = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(gallery)
+    assert 3_000 < len(gallery.webp(gallery.figure_of(gallery.scripts()[name]))) <= gallery.MOST
+    plt.close("all")
+
+
+def test_every_name_of_the_door_is_documented():
+    page = (ROOT / "docs" / "api" / "index.md").read_text()
+    assert set(re.findall(r'heading: "rj\.(\w+)"', page)) == set(rj.__all__)
+
+
+def test_every_page_is_in_the_navigation():
+    """What mkdocs would only mention."""
+    listed = set(re.findall(r": ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
+    made = {f"tutorials/{path.stem}.md" for path in NOTEBOOKS}
+    listed |= set(re.findall(r"- ([\w/.-]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
+    assert made <= listed
+    assert listed - made == {str(path.relative_to(ROOT / "docs")) for path in PAGES}
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The documentation, built strictly: a broken link or name is a failure. Notebooks as the tests left them."""
+    folder = tmp_path_factory.mktemp("docs") / "site"
+    env = os.environ | {"ROTORJAX_DOCS_EXECUTE": "0", "NO_MKDOCS_2_WARNING": "1"}
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    built = subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
+    assert built.returncode == 0, built.stderr[-4000:]
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_asks_nothing_of_the_network(site):
+    fetched = re.compile(r"""<(?:script|img|iframe|source)[^>]* src=["']?https?:|<link[^>]* href=["']?https?:""")
+    pages = list(site.rglob("*.html"))
+    assert len(pages) > 40
+    for page in pages:
+        assert not fetched.search(page.read_text(encoding="utf-8")), page
+    assert "<math" in (site / "theory" / "ground.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_site_opens_from_a_file(site, tmp_path):
+    picture, said = seen(site / "theory" / "free-wake.html", tmp_path)
+    assert said == []
+    assert picture.std() > 0.1

@@ -11,6 +11,8 @@ from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from rotorjax.linearisation.handover import Time
     from rotorjax.ode.models import LinearModel, PeriodicModel
     from rotorjax.simulation.march import March
@@ -132,3 +134,40 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
     if target == "freewake" and data and isinstance(data[0], str | Path):
         data = (teacher.find_cases(data[0]), *data[1:])
     return runs[target](*data, **settings)
+
+
+def evaluate(
+    folder: str | Path,
+    heights: Sequence[float] = (1.0, 1.5, 2.0),
+    slopes_deg: Sequence[float] = (15.0,),
+    quick: bool = True,
+    draw: bool = False,
+) -> "xr.Dataset":
+    """Both models of the UH-60 over heights (over R) and slopes (at h = 1), out of ground effect too, as one data set.
+
+    Finished cases are kept in folder/cases, as `rotorjax study --out` keeps them, and not solved again. quick: coarse
+    wakes of rigid blades. draw: write every figure whose cases are there to the folder. Raises InputError where a
+    height or slope is not allowed or the folder holds another study.
+    """
+    from rotorjax.bench.cases import study_cases
+    from rotorjax.bench.dataset import combine
+    from rotorjax.bench.settings import study_settings
+    from rotorjax.study.figures import draw_all
+    from rotorjax.study.run import solve_cases
+
+    settings = study_settings("uh60", quick=quick)
+    data = combine(solve_cases(study_cases(heights, slopes_deg), settings, folder, show=False).cases, settings)
+    if draw:
+        draw_all(data, folder)
+    return data
+
+
+def over_deck(case: str | Path) -> "tuple[xr.Dataset, dict[str, float]]":
+    """Fly a case file over a moving deck (`deck.case` shows one): histories with units, and what the march took.
+
+    Raises InputError where it cannot be flown.
+    """
+    from rotorjax.deck.case import read_case
+    from rotorjax.deck.run import run_case
+
+    return run_case(read_case(case))

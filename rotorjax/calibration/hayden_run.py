@@ -12,12 +12,13 @@ from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import select
 from rotorjax.calibration import hayden
 from rotorjax.calibration.calibration_file import Calibration
-from rotorjax.calibration.fit import Fit, Many, Progress, calibrate, calibrate_many, even_starts
+from rotorjax.calibration.fit import Fit, Many, Method, Progress, calibrate, calibrate_many, even_starts
 from rotorjax.calibration.hayden import HaydenData
 from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 
 STARTS = 8
+DRIVERS = ("least_squares", "lbfgs", "adam")
 STEPS = {"adam": 2000}  # enough to end within 1e-6 of least squares; the others' own numbers
 
 
@@ -72,14 +73,18 @@ def run(
     loading: hayden.Loading = "elliptic",
     tau: tuple[np.ndarray, np.ndarray] | None = None,
     progress: Progress | None = None,
+    drivers: Sequence[Method] = DRIVERS,
+    starts: int = STARTS,
 ) -> HaydenRun:
-    """Fit with all drivers and from many starts. Arguments and errors: as `hayden.hayden_data`."""
+    """Fit with some drivers, "least_squares" among them, and from many starts.
+
+    Other arguments and errors: as `hayden.hayden_data`.
+    """
     data, chosen = hayden.hayden_data(heights, parameters, loading, tau)
 
     def everything() -> tuple[dict[str, Fit], Many]:
-        names = ("least_squares", "lbfgs", "adam")
-        fits = {n: calibrate(hayden.residual, chosen, data, None, n, STEPS.get(n), progress) for n in names}
-        return fits, calibrate_many(hayden.residual, chosen, data, even_starts(chosen, STARTS))
+        fits = {n: calibrate(hayden.residual, chosen, data, None, n, STEPS.get(n), progress) for n in drivers}
+        return fits, calibrate_many(hayden.residual, chosen, data, even_starts(chosen, starts))
 
     begun = time.perf_counter()
     everything()
@@ -117,8 +122,8 @@ def record(result: HaydenRun) -> dict[str, Any]:
         "drivers": {n: {"parameters": f.parameters.table(f.values), "rms_error": f.rms, "converged": f.converged}
                     for n, f in result.fits.items()},
         "largest_difference_of_drivers": result.disagreement,
-        "starts": {"count": STARTS, "converged": int(result.many.converged.sum()), "spread": result.spread,
-                   "wall_time_s": result.many.wall_time_s},
+        "starts": {"count": result.many.converged.size, "converged": int(result.many.converged.sum()),
+                   "spread": result.spread, "wall_time_s": result.many.wall_time_s},
         "wall_time_s": result.wall_time_s,
         "compile_time_s": result.compile_time_s,
     }  # fmt: skip
@@ -143,8 +148,8 @@ def report(result: HaydenRun) -> str:
     lines += [
         f"{'rms':>6}{'':>10}{fit.rms:10.4f}{result.printed_rms:16.4f}",
         "",
-        f"drivers agree to {result.disagreement:.1e}; {int(result.many.converged.sum())} of {STARTS} starts converge, "
-        f"within {result.spread:.1e}",
+        f"drivers agree to {result.disagreement:.1e}; {int(result.many.converged.sum())} of "
+        f"{result.many.converged.size} starts converge, within {result.spread:.1e}",
         ("converged: " if fit.converged else "NOT CONVERGED: ") + fit.why,
         f"{result.wall_time_s:.1f} s, compiling {result.compile_time_s:.1f} s",
     ]

@@ -1,4 +1,4 @@
-"""The dynamic rotor: [M]å + [D][V][L]⁻¹[M]a = [D]τ forward in time, and its costates backward (Eq. 1).
+"""The dynamic rotor: M å + D V L⁻¹ M a = D τ forward in time, and its costates backward (Eq. 1).
 
 Time is azimuth (rad), so a dot is d/dψ. Mass flow: V_T = √(μ² + λ²) for a_1^0 and V̄ = (μ² + λ(λ + λ_i))/V_T for the
 others, λ = λ_climb + λ_i, λ_i = (2/√3)[L⁻¹Ma]_1; in hover V and 2V, as in Eq. 4. Which modes are "others" is the

@@ -1,4 +1,4 @@
-"""Matrices of the finite-state equation [M]å + [D][V][L]⁻¹[M]a = [D]τ (Eq. 1): closed forms for any skew angle.
+"""Matrices of the finite-state equation M å + D V L⁻¹ M a = D τ (Eq. 1): closed forms for any skew angle.
 
 Rows (r, j), columns (m, n), blocks by the parities of the two mode tables; "odd" is an odd index sum (pressure), "even"
 an even one (mass source). X = tan(χ/2) with χ the wake skew, l = min(r, m), s = √((2n+1)(2j+1)) and

@@ -11,6 +11,7 @@ import xarray as xr
 from wakes import COARSE
 
 import rotorjax as rj
+from rotorjax.ode.models import LinearModel
 from rotorjax.potential import model as potential
 
 SETTINGS = rj.WakeSettings(**COARSE, azimuths=4)
@@ -128,3 +129,16 @@ def test_wrong_input_is_named(wake, over_ground):
         rj.calibrate("haydn")
     with pytest.raises(rj.InputError, match="neither"):
         rj.linearise(over_ground)
+
+
+def test_the_deck_and_the_exports_are_at_the_door(tmp_path):
+    case = tmp_path / "case.toml"
+    case.write_text('[rotor]\nname = "uh60"\n[time]\nduration = 0.0\n[path]\nt = [0.0]\nheight = [1.0]\n')
+    with pytest.raises(rj.InputError, match="duration"):
+        rj.over_deck(case)
+    with pytest.raises(rj.InputError, match="slopes"):
+        rj.evaluate(tmp_path / "out", slopes_deg=(0.0,))
+    one = np.eye(1)
+    model = LinearModel(one, one, one, one, ("x",), ("u",), ("y",), ("rad",), ("1",))
+    assert rj.to_control(model).nstates == 1
+    assert rj.save_mat(model, tmp_path / "model.mat").exists()
