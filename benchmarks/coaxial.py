@@ -3,8 +3,8 @@
 The rotor that NACA TN 2318 tested (Harrington 1951): two two-bladed rotors, radius 3.81 m, chord 0.4572 m, untwisted,
 0.19 R apart, solidity 0.152 together; the section is taken as NACA 0012. Prints C_T and C_Q of pair and single rotor
 over collective, both rotors of the pair at the same torque; then, at equal thrusts, induced power of the pair over
-that of two rotors alone, over the distance between them; momentum theory has √2 at no distance, 1.281 with the lower rotor
-in the upper one's far wake (Leishman & Syal 2008, doi:10.4050/JAHS.53.11).
+that of two rotors alone, over the distance between them; momentum theory has √2 at no distance, 1.281 with the lower
+rotor in the upper one's far wake (Leishman & Syal 2008, doi:10.4050/JAHS.53.11).
 """
 
 import argparse
