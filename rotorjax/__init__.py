@@ -37,6 +37,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "names": "rotorjax.rotor.catalogue",
     "make_rotor": "rotorjax.rotor.geometry:rotor",
     "free_wake": "rotorjax.wake.model",
+    "several_wakes": "rotorjax.wake.several",
     "WakeSettings": "rotorjax.wake.settings",
     "flight_settings": "rotorjax.wake.settings",
     "quick_settings": "rotorjax.wake.settings",

@@ -25,6 +25,7 @@ from rotorjax.wake.model import free_wake as free_wake
 from rotorjax.wake.settings import WakeSettings as WakeSettings
 from rotorjax.wake.settings import flight_settings as flight_settings
 from rotorjax.wake.settings import quick_settings as quick_settings
+from rotorjax.wake.several import several_wakes as several_wakes
 
 __version__: str
 make_rotor = _rotor

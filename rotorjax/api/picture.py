@@ -1,5 +1,8 @@
-"""A solved rotor as a picture."""
+"""Solved rotors as pictures."""
 
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
@@ -15,6 +18,9 @@ from rotorjax.bench.plotting import (
     shared_levels,
     style,
 )
+
+if TYPE_CHECKING:
+    from rotorjax.api.several import SolvedTogether
 
 COLOURS = {"free wake": FREE_WAKE, "finite state": VPBFSM}
 
@@ -40,3 +46,47 @@ def picture(data: xr.Dataset) -> Figure:
             filled = polar_contour(disk, r, psi, inflow, shared_levels([inflow]))
             figure.colorbar(filled, ax=disk, label=r"inflow over $\Omega R$", shrink=0.8, pad=0.1)
     return figure
+
+
+def together(solved: "SolvedTogether") -> Figure:
+    """Mean flow of several rotors in the upright plane through their hubs, their disks, tip vortices and ground."""
+    model = solved.found.model
+    hubs, ground = np.asarray(model.places), model.wakes.ground
+    floor = None if ground is None else float(hubs[0, 2] - ground.height[0])
+    across_hubs = _direction(hubs)
+    along = hubs @ across_hubs
+    middle = hubs.mean(axis=0) * [1, 1, 0] - along.mean() * across_hubs
+    span = np.linspace(along.min() - 1.8, along.max() + 1.8, 73)
+    bottom = hubs[:, 2].min() - 2.0 if floor is None else floor
+    height = np.linspace(bottom + 1e-3, hubs[:, 2].max() + 0.8, 55)
+    s, z = np.meshgrid(span, height)
+    points = middle + s[..., None] * across_hubs + z[..., None] * np.array([0.0, 0.0, 1.0])
+    flow = np.asarray(solved.velocity(jnp.asarray(points.reshape(-1, 3)))).reshape(points.shape)
+    with style():
+        figure = new_figure(7.5, 1.2 + 7.0 * np.ptp(height) / np.ptp(span))
+        axes = figure.add_subplot()
+        most = float(np.quantile(np.abs(flow[..., 2]), 0.995))
+        filled = axes.contourf(s, z, -flow[..., 2], levels=np.linspace(-most, most, 21), cmap="RdBu_r", extend="both")
+        axes.streamplot(span, height, flow @ across_hubs, flow[..., 2], color="#666666", linewidth=0.5, arrowsize=0.6)
+        for path in solved.tip_vortices().reshape(-1, *solved.tip_vortices().shape[2:]):
+            axes.plot(path @ across_hubs, path[:, 2], color=FREE_WAKE, linewidth=0.6, alpha=0.7)
+        for at, up in zip(along, hubs[:, 2], strict=True):
+            axes.plot([at - 1, at + 1], [up, up], color="black", linewidth=2.5, solid_capstyle="butt")
+        if floor is not None:
+            axes.axhline(floor, color="#7a5c3e", linewidth=3)
+        axes.set(xlim=span[[0, -1]], ylim=(bottom - 0.03, height[-1]), aspect="equal", ylabel="z/R")
+        axes.set_xlabel("along the line of hubs, over R")
+        axes.grid(visible=False)
+        thrusts = ", ".join(f"{value:.5f}" for value in np.asarray(solved.CT))
+        axes.set_title(f"{len(hubs)} rotors, $C_T$ = {thrusts}" + ("" if solved.converged else ", NOT CONVERGED"))
+        figure.colorbar(filled, ax=axes, label=r"mean flow downward over $\Omega R$", shrink=0.9)
+    return figure
+
+
+def _direction(hubs: np.ndarray) -> np.ndarray:
+    """Level unit vector along which hubs lie apart; to starboard where they are on one shaft."""
+    level = (hubs - hubs.mean(axis=0)) * [1, 1, 0]
+    if np.ptp(level) < 1e-9:
+        return np.array([0.0, 1.0, 0.0])
+    first = np.linalg.svd(level)[2][0]
+    return first * np.sign(first[np.argmax(np.abs(first))])

@@ -18,11 +18,14 @@ from rotorjax.inflow.balance import Balance, balance
 from rotorjax.potential import model as potential
 from rotorjax.wake import field, sensitivity
 from rotorjax.wake.model import FreeWake
+from rotorjax.wake.several import SeveralWakes
 from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from rotorjax.api.several import SolvedTogether
 
 Number = Numbers = Any  # of numpy, or of jax under tracing
 
@@ -131,7 +134,7 @@ NAMES = {FreeWake: "free wake", FiniteState: "finite state"}
 
 @singledispatch
 def solve(model: FreeWake | FiniteState, start: Solved | None = None, **settings: Any) -> Solved:
-    """Find the steady inflow of a rotor and what it does in it.
+    """Find the steady inflow of a rotor and what it does in it; of several rotors (`rj.several_wakes`) too.
 
     start: a solved neighbour that a free wake's search begins from. settings: of a free wake's search (`tol`,
     `progress`). Works under jax.grad, jacfwd, vmap and jit (`wake.sensitivity.solve` says how a free wake does). Raises
@@ -159,6 +162,14 @@ def _(model: FreeWake, start: Solved | None = None, **settings: Any) -> Solved:
 @solve.register
 def _(model: FiniteState, start: Solved | None = None) -> Solved:
     return Solved(model, balance(model.flow, model.rotor, model.operating, model.stations))
+
+
+@solve.register(SeveralWakes)
+def _(model: SeveralWakes, start: "SolvedTogether | None" = None, **settings: Any) -> Any:
+    from rotorjax.api.several import SolvedTogether
+    from rotorjax.wake.several_solution import solve_several
+
+    return SolvedTogether(solve_several(model, None if start is None else start.found, **settings))
 
 
 def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) -> Float[Array, "N 3"]:

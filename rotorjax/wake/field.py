@@ -63,7 +63,7 @@ def node_velocities(
     angles = azimuths(state, psi)
     numbers = jnp.arange(slices(state))
     control = jax.vmap(lambda k: model.of_slice(k).control)(numbers)
-    targets = _targets(model, state)
+    targets = targets_of(model, state)
     segments = wake_segments(model, state, psi, "all" if old is None else "free")
     if old is None:
         v = _at_targets(model, segments, targets, angles)
@@ -85,14 +85,14 @@ def old_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, 
     Over ground four fifths of all pairs; seen from the blades it changes slowly: a march may take it once a step
     (`node_velocities`).
     """
-    targets, angles = _targets(model, state), azimuths(state, psi)
+    targets, angles = targets_of(model, state), azimuths(state, psi)
     found = _at_targets(model, wake_segments(model, state, psi, "old"), targets, angles)
     if model.ground is None:
         return found
     return found + _at_targets(model, wake_segments(model, state, psi, "free"), targets, angles, image=True)
 
 
-def _targets(model: FreeWake, state: WakeState) -> Float[Array, "K N 3"]:
+def targets_of(model: FreeWake, state: WakeState) -> Float[Array, "K N 3"]:
     """Control points, near and far nodes of each slice."""
     control = jax.vmap(lambda k: model.of_slice(k).control)(jnp.arange(slices(state)))
     return jnp.concatenate([a.reshape(len(a), -1, 3) for a in (control, state.near, state.far)], axis=1)
@@ -107,21 +107,21 @@ def _at_targets(
     image: bool = False,
 ) -> Float[Array, "K N 3"]:
     """Velocity at points of the slices' frames, all blades' at one instant in one sum; image: of the images alone."""
-    places = _together(_turned(targets, angles), model.rotor.blades)
+    places = to_hub(targets, angles, model.rotor.blades)
     if image and model.ground is not None:
         own = replace(model, ground=None)
-        mirrored = _at_instants(own, segments, model.ground.reflect_points(places), angles)
+        mirrored = at_instants(own, segments, model.ground.reflect_points(places), angles)
         found = model.ground.reflect_vectors(mirrored)
     else:
-        found = _at_instants(model, segments, places, angles)
-    return _turned(_apart(found, len(targets)), -angles)
+        found = at_instants(model, segments, places, angles)
+    return from_hub(found, angles, len(targets))
 
 
 def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> Float[Array, "K N 3"]:
     """Induced velocity over ΩR at hub-frame points over R, at each of the state's azimuths; climb not included."""
     instants = -(-slices(state) // model.rotor.blades)
     places = jnp.broadcast_to(points, (instants, *points.shape))
-    found = _at_instants(model, wake_segments(model, state), places, azimuths(state))
+    found = at_instants(model, wake_segments(model, state), places, azimuths(state))
     return jnp.tile(found, (slices(state) // instants, 1, 1))
 
 
@@ -132,12 +132,12 @@ def velocity_now(
     segments, angles = wake_segments(model, state, psi), azimuths(state, psi)
     if slices(state) == 1:
         turned = rotate_about_shaft(points, -angles)
-        return rotate_about_shaft(_at_instants(model, segments, turned[None], angles)[0], angles)
+        return rotate_about_shaft(at_instants(model, segments, turned[None], angles)[0], angles)
     places = jnp.broadcast_to(points, (slices(state) // model.rotor.blades, *points.shape))
-    return _at_instants(model, segments, places, angles)[0]
+    return at_instants(model, segments, places, angles)[0]
 
 
-def _at_instants(
+def at_instants(
     model: FreeWake, segments: Segments, places: Float[Array, "I N 3"], angles: Float[Array, " K"]
 ) -> Float[Array, "I N 3"]:
     """Velocity at points of the hub frame, N for each instant, from all blades' wakes and their images in the ground.
@@ -158,6 +158,16 @@ def _at_instants(
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
     return jax.lax.map(one, (places, of_instants))
+
+
+def to_hub(points: Float[Array, "K n 3"], angles: Float[Array, " K"], blades: int) -> Float[Array, "I m 3"]:
+    """Points of the slices' frames in the hub's, by instants: all blades' at one instant in a row."""
+    return _together(_turned(points, angles), blades)
+
+
+def from_hub(vectors: Float[Array, "I m 3"], angles: Float[Array, " K"], count: int) -> Float[Array, "K n 3"]:
+    """Vectors at the points of `to_hub` back in the frames of `count` slices."""
+    return _turned(_apart(vectors, count), -angles)
 
 
 def _turned(vectors: Float[Array, "K n 3"], angles: Float[Array, " K"]) -> Float[Array, "K n 3"]:

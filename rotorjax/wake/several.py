@@ -1,0 +1,284 @@
+"""Several rotors in one free wake: every rotor has its own states, and all are carried by the flow of all.
+
+Hubs stand at places over R in a common frame (x aft, y to starboard, z up), shafts upright, one radius and one speed.
+A rotor that turns clockwise is kept in a frame mirrored in y, as in potential/rotors.py, so that its blades run along
+rising azimuth too. Level ground answers every wake with its image.
+
+How the rotors see each other:
+    K = 1           rotors on one shaft, each in the flow of the others averaged over their azimuth: what is left out is
+                    how the inflow pulses as blades pass each other, 2B times a revolution;
+    K slices        rotors anywhere, periodic over the passage of a blade: the slices of one instant see each other
+                    where they stand.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, ArrayLike, Float
+
+from rotorjax.checks import Range, array, check_range, known, refuse, shown
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.geometry import Rotor
+from rotorjax.wake.biot_savart import segment_velocity
+from rotorjax.wake.dynamics import inputs_of
+from rotorjax.wake.equilibrium import Evaluation, Unknowns, full_state, transported
+from rotorjax.wake.field import at_instants, from_hub, node_velocities, targets_of, to_hub, wake_segments
+from rotorjax.wake.loads import blade_loads
+from rotorjax.wake.model import FreeWake, WakeState, free_wake
+from rotorjax.wake.performance import Performance, performance
+from rotorjax.wake.segments import Segments
+from rotorjax.wake.settings import WakeSettings
+
+COPIES = 24
+"""Least number of blades that stand for the mean over another rotor's azimuth: twice as many change C_T by 1e-5."""
+
+NEAREST = 0.02
+"""Least distance of two disks on one shaft, over R."""
+
+THRUST_SLOPE = 0.05
+"""About ∂C_T/∂θ₀ of a rotor in its wake: the scale on which a missed thrust counts beside the wake's residual."""
+
+
+class SeveralWakes(eqx.Module):
+    """N rotors in one free wake, and the ground under the common origin.
+
+    wakes: every array with a leading axis N. places (N, 3): hubs, over R. senses (N,): 1 counter-clockwise, −1 not.
+    phases (N,): azimuth of each rotor's blade 0 as slice 0 stands there, in its own sense. coupling: share of each
+    other's flow that counts, 1 in every physical case. thrusts (N,): C_T that the collectives are trimmed to, or None.
+    slices (static): K.
+    """
+
+    wakes: FreeWake
+    places: Float[Array, "N 3"]
+    senses: Float[Array, " N"]
+    phases: Float[Array, " N"]
+    coupling: Float[Array, ""]
+    thrusts: Float[Array, " N"] | None
+    slices: int = eqx.field(static=True)
+
+    def __len__(self) -> int:
+        """N."""
+        return len(self.places)
+
+    def one(self, i: int) -> FreeWake:
+        """The model of one rotor alone, over its own ground."""
+        return jax.tree.map(lambda a: a[i], self.wakes)
+
+
+class Together(NamedTuple):
+    """What is solved for: the wakes' unknowns with a leading axis N, and the collectives (N,), rad."""
+
+    wakes: Unknowns
+    collective: Float[Array, " N"]
+
+
+def several_wakes(
+    rotor: Rotor,
+    operating: OperatingPoint,
+    places: Sequence[Sequence[float]],
+    senses: Sequence[int] | None = None,
+    ground: Plane | None = None,
+    settings: WakeSettings | None = None,
+    *,
+    collectives_deg: ArrayLike | None = None,
+    thrusts: ArrayLike | None = None,
+    phases_deg: ArrayLike | None = None,
+) -> SeveralWakes:
+    """Make the model of N like rotors in one free wake, hovering or climbing, in or out of ground effect.
+
+    places (N, 3): hubs over R, x aft, y to starboard, z up. senses: 1 counter-clockwise, −1 clockwise, seen from above;
+    by default they alternate. ground: level, its height counted from the common origin. collectives_deg (N,): the
+    operating point's by default. thrusts (N,): C_T of each rotor that its collective is trimmed to. phases_deg (N,):
+    where blade 0 of each stands as slice 0 does. Rotors on one shaft are solved in each other's mean flow (K = 1).
+
+    Raises InputError where shapes differ, a sense is not ±1, disks overlap, the ground is tilted or cuts a disk.
+
+    >>> import rotorjax as rj
+    >>> pair = several_wakes(*rj.rotor("uh60"), [(0, 0, 0), (0, 0, -0.2)])
+    >>> pair.slices, pair.senses.tolist()
+    (1, [1.0, -1.0])
+    """
+    place = np.array(places, float)
+    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 2 or not np.all(np.isfinite(place)):
+        raise refuse("places", "be finite and of shape (N, 3) for N >= 2 rotors", f"of shape {place.shape}")
+    count = len(place)
+    sense = np.array([1 - 2 * (i % 2) for i in range(count)] if senses is None else senses, float)
+    if sense.shape != (count,) or not np.all(np.abs(sense) == 1):
+        raise refuse("senses", f"hold {count} numbers, 1 (counter-clockwise) or -1", shown(senses))
+    _check_apart(place)
+    _check_ground(place, ground)
+    pitch = operating.collective * 180 / np.pi if collectives_deg is None else collectives_deg
+    models = [
+        free_wake(rotor, _pitched(operating, angle), _under(ground, at), settings)
+        for angle, at in zip(_each("collectives_deg", pitch, count), place, strict=True)
+    ]
+    shared = np.ptp(place[:, :2]) == 0 and np.all(np.ptp(place[:, :2], axis=0) == 0)
+    return SeveralWakes(
+        wakes=jax.tree.map(lambda *a: jnp.stack(a), *models),
+        places=jnp.asarray(place),
+        senses=jnp.asarray(sense),
+        phases=_each("phases_deg", 0.0 if phases_deg is None else phases_deg, count) * (jnp.pi / 180),
+        coupling=array(1.0),
+        thrusts=None if thrusts is None else _thrusts(thrusts, count),
+        slices=1 if shared else models[0].settings.azimuths,
+    )
+
+
+def _each(name: str, values: ArrayLike, count: int) -> Float[Array, " N"]:
+    """One number for each rotor; a lone number stands for all."""
+    found = array(values)
+    if found.shape not in ((), (count,)) or (known(found) and not np.all(np.isfinite(found))):
+        raise refuse(name, f"be a number or {count} of them, all finite", shown(values))
+    return jnp.broadcast_to(found, (count,))
+
+
+def _thrusts(values: ArrayLike, count: int) -> Float[Array, " N"]:
+    found = _each("thrusts", values, count)
+    if known(found):
+        for value in np.asarray(found):
+            check_range("thrusts", float(value), Range(0.0, 0.1, above=True, hint="C_T = T/(ρA(ΩR)²) of each rotor"))
+    return found
+
+
+def _pitched(operating: OperatingPoint, degrees: Array) -> OperatingPoint:
+    return eqx.tree_at(lambda o: o.collective, operating, degrees * (jnp.pi / 180))
+
+
+def _under(ground: Plane | None, place: np.ndarray) -> Plane | None:
+    """The plane seen from a hub."""
+    return None if ground is None else Plane(ground.height + place[2], ground.slope)
+
+
+def _check_apart(place: np.ndarray) -> None:
+    """Refuse disks that have a point in common."""
+    for i in range(len(place)):
+        for j in range(i):
+            gap = place[i] - place[j]
+            if np.hypot(*gap[:2]) < 2 and abs(gap[2]) < NEAREST:
+                raise InputError(
+                    f"Argument `places` must keep the disks apart, but rotors {j} and {i} at {place[j].tolist()} and "
+                    f"{place[i].tolist()} overlap: move one by 2 R, or by {NEAREST:g} R along its shaft"
+                )
+
+
+def _check_ground(place: np.ndarray, ground: Plane | None) -> None:
+    if ground is None or not known(ground):
+        return
+    if float(ground.slope) != 0:
+        raise refuse("ground", "be level under several rotors", f"tilted by {np.rad2deg(float(ground.slope)):g} deg")
+    height = float(ground.height) + place[:, 2]
+    if not np.all(height > 0):
+        i = int(np.argmin(height))
+        raise refuse("places", "keep every disk above the ground", f"{-height[i]:.3g} R under it for rotor {i}")
+
+
+def mirrored(vectors: Float[Array, "*n 3"], sense: Float[Array, ""]) -> Float[Array, "*n 3"]:
+    """Vectors taken from a rotor's own frame to the common one's directions, and back."""
+    return vectors * jnp.stack([jnp.ones_like(sense), sense, jnp.ones_like(sense)])
+
+
+def evaluate(several: SeveralWakes, x: Unknowns) -> Evaluation:
+    """States, velocities and loads of all rotors in one another's flow; every array with a leading axis N."""
+    state, start = eqx.filter_vmap(full_state)(several.wakes, x)
+    own = jax.lax.map(lambda one: node_velocities(*one), (several.wakes, state, several.phases))
+    added = several.coupling * interference(several, state)
+    ends = np.cumsum([own.control.shape[2], np.prod(own.near.shape[2:4])])
+    parts = jnp.split(added, ends, axis=2)
+    velocities = jax.tree.map(lambda v, more: v + more.reshape(v.shape), own, type(own)(*parts))
+    loads = eqx.filter_vmap(lambda m, v, gamma: blade_loads(m, v, gamma, inputs_of(m)))(
+        several.wakes, velocities.control, x.gamma_bound
+    )
+    return Evaluation(state, velocities, loads, start)
+
+
+def interference(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
+    """What the other rotors' wakes and their images induce at each rotor's control points and nodes, in the frames of
+    its slices, over ΩR.
+    """
+    count = len(several)
+    targets = eqx.filter_vmap(targets_of)(several.wakes, state)
+    segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
+    here = jnp.arange(count)
+
+    def seen(i: Array, j: Array) -> Array:
+        source, sources = jax.tree.map(lambda a: a[j], (several.wakes, segments))
+        return _from_another(several, i, j, targets[i], source, sources)
+
+    def of_all_others(i: Array) -> Array:
+        return jnp.sum(jax.lax.map(lambda j: seen(i, j), (i + 1 + here[:-1]) % count), axis=0)
+
+    return jax.lax.map(of_all_others, here)  # one rotor after the other: a batch of kernels has no linear map
+
+
+def _from_another(
+    several: SeveralWakes, i: Array, j: Array, targets: Float[Array, "K T 3"], source: FreeWake, segments: Segments
+) -> Float[Array, "K T 3"]:
+    """Velocity at points of rotor i's slices from the wake of rotor j."""
+    apart, turned = several.places[i] - several.places[j], several.senses[i] * several.senses[j]
+    angles = several.phases + 2 * jnp.pi / several.slices * jnp.arange(several.slices)[:, None]
+    at = to_hub(targets, angles[:, i], source.rotor.blades)
+    points = mirrored(at, turned) + mirrored(apart, several.senses[j])
+    if several.slices == 1:
+        flow = _mean_flow(source, jax.tree.map(lambda a: a[0], segments), points[0])[None]
+    else:
+        flow = at_instants(source, segments, points, angles[:, j])
+    return from_hub(mirrored(flow, turned), angles[:, i], several.slices)
+
+
+def _mean_flow(model: FreeWake, segments: Segments, points: Float[Array, "T 3"]) -> Float[Array, "T 3"]:
+    """Flow of a rotor's axisymmetric wake averaged over its azimuth: many weak copies of one blade's."""
+    blades = model.rotor.blades
+    copies = -(-COPIES // blades)
+    weak = segments._replace(strength=segments.strength / copies)
+    return segment_velocity(points, *weak, plane=model.ground, blades=blades * copies)
+
+
+def told(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation]:
+    """How far a pass through all rotors' flow moves the wakes and how far the thrusts are off; with the evaluation."""
+    driven = with_collectives(several, x.collective)
+    found = evaluate(driven, x.wakes)
+    new = eqx.filter_vmap(transported)(driven.wakes, found)
+    moved = jax.tree.map(lambda a, b: a - b, new, x.wakes)
+    if several.thrusts is None:
+        missed = several.wakes.operating.collective - x.collective
+    else:
+        missed = (several.thrusts - loads_of(driven, found).thrust) / THRUST_SLOPE
+    return Together(moved, missed), found
+
+
+def residual(x: Together, several: SeveralWakes) -> Together:
+    """`told` without the evaluation: zero at the periodic equilibrium."""
+    return told(x, several)[0]
+
+
+def with_collectives(several: SeveralWakes, collective: Float[Array, " N"]) -> SeveralWakes:
+    """The rotors at other collectives (rad)."""
+    return eqx.tree_at(lambda s: s.wakes.operating.collective, several, collective)
+
+
+def loads_of(several: SeveralWakes, found: Evaluation) -> Performance:
+    """Thrust, power and mean inflow of each rotor, arrays (N,)."""
+    return eqx.filter_vmap(performance)(several.wakes, found)
+
+
+def velocity(several: SeveralWakes, state: WakeState, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
+    """Induced velocity over ΩR at points of the common frame (over R), mean over the instants of a blade's passage."""
+    segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
+
+    def one(model: FreeWake, sources: Segments, place: Array, sense: Array, phase: Array) -> Array:
+        own = mirrored(points - place, sense)
+        if several.slices == 1:
+            return mirrored(_mean_flow(model, jax.tree.map(lambda a: a[0], sources), own), sense)
+        instants = several.slices // model.rotor.blades
+        at = jnp.broadcast_to(own, (instants, *own.shape))
+        angles = phase + 2 * jnp.pi / several.slices * jnp.arange(several.slices)
+        return mirrored(jnp.mean(at_instants(model, sources, at, angles), axis=0), sense)
+
+    each = (several.wakes, segments, several.places, several.senses, several.phases)
+    return jnp.sum(jax.lax.map(lambda args: one(*args), each), axis=0)

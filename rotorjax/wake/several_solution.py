@@ -1,0 +1,214 @@
+"""Solving for several rotors in one free wake: each alone first, then in a growing share of the others' flow."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from rotorjax.errors import InputError
+from rotorjax.ode.continuation import continuation
+from rotorjax.ode.implicit import attach
+from rotorjax.ode.linear import Krylov
+from rotorjax.ode.newton import newton
+from rotorjax.ode.outcome import Outcome
+from rotorjax.wake import several as flow
+from rotorjax.wake.equilibrium import METHOD, Evaluation, Unknowns, displacement, spread
+from rotorjax.wake.model import WakeState
+from rotorjax.wake.performance import Performance
+from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
+from rotorjax.wake.search import Progress
+from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
+from rotorjax.wake.solution import Solution, readings, solve
+
+Number = Numbers = Any
+
+
+@dataclass(frozen=True)
+class SeveralSolution:
+    """N rotors in their common periodic wake. Lengths over R, velocities over ΩR, in each rotor's own frame.
+
+    model, state: the state (leading axis N) belongs to this model, whose collectives are those trimmed to. rotors: each
+    rotor's own readings. converged, why, residual (rms distance that nodes move in one pass), iterations: of the
+    search; coupling: share of the other rotors' flow in what is here, 1 where converged. CT, CP, CP_induced,
+    mean_inflow (N,).
+    """
+
+    model: SeveralWakes
+    state: WakeState
+    rotors: tuple[Solution, ...]
+    converged: bool
+    why: str
+    residual: float
+    iterations: int
+    CT: Numbers
+    CP: Numbers
+    CP_induced: Numbers
+    mean_inflow: Numbers
+
+    @property
+    def collective_deg(self) -> Numbers:
+        """Collective of each rotor, degrees, (N,)."""
+        return np.rad2deg(self.model.wakes.operating.collective)
+
+    @property
+    def coupling(self) -> float:
+        """Share of the others' flow that each rotor sees."""
+        return float(self.model.coupling)
+
+    @property
+    def figure_of_merit(self) -> Number:
+        """Ideal power of the rotors, each on its own disk, over what they take: Σ C_T^1.5/√2 / Σ C_P."""
+        return np.sum(self.CT**1.5) / np.sqrt(2) / np.sum(self.CP)
+
+    def velocity(self, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
+        """Induced velocity over ΩR at points of the common frame over R, mean over the blades' passage."""
+        return _velocity(self.model, self.state, jnp.asarray(points, float))
+
+
+_velocity = eqx.filter_jit(flow.velocity)
+
+
+class EachInverse(eqx.Module):
+    """One rotor's inverse Jacobian for each of several, their effect on each other left out."""
+
+    inverse: HarmonicInverse
+
+    def __call__(self, v: Together, x: Together, model: SeveralWakes) -> Together:
+        """Return about J⁻¹ v."""
+        return Together(jax.vmap(lambda one: self.inverse(one, one, model.wakes))(v.wakes), -v.collective)
+
+
+def solve_several(
+    several: SeveralWakes, start: SeveralSolution | None = None, progress: Progress | None = None, tol: float = 1e-7
+) -> SeveralSolution:
+    """Find the periodic wake of several rotors, from each one's own or from that of a neighbouring case.
+
+    start: a converged solution of as many like rotors. progress(stage, residual): called after each step. tol: relative
+    rms of the residual. A search that does not get there comes back with `converged` False, why, and what it reached:
+    its `coupling` says at which share of the other rotors' flow it was lost.
+    """
+    count = len(several)
+    if start is not None and start.converged and len(start.model) == count and start.model.slices == several.slices:
+        x, linear = _unknowns(start), _method(several, _mean(start.state))
+        found = _newton(several, x, linear, tol)
+        _tell(progress, "neighbour", found)
+        if found.converged:
+            return _read(several, found, found.iterations)
+    alone, spent = _alone(several, progress, tol)
+    if not all(one.converged for one in alone):
+        return _read(_share(several, 0.0), _outcome(several, alone), spent)
+    linear = _method(several, alone[0].unknowns)
+    state = {"spent": spent}
+
+    def step(x: Together, share: float, _: Any) -> Outcome:
+        found = _newton(_share(several, share), x, linear, tol if share == 1 else max(tol, 1e-5))
+        _tell(progress, f"together {share:.2f}", found)
+        state["spent"] += found.iterations
+        return found
+
+    branch = continuation(
+        step, _outcome(several, alone).x, 0.0, 1.0, step=1.0, largest=1.0, smallest=0.03, easy=5, jump=0.3
+    )
+    if not branch.outcomes:
+        assert branch.failed is not None
+        return _read(_share(several, 0.0), replace(branch.failed, why=branch.why), state["spent"])
+    found = branch.last if branch.reached else replace(branch.last, converged=False, why=f"together: {branch.why}")
+    return _read(_share(several, branch.parameters[-1]), found, state["spent"])
+
+
+def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Performance:
+    """Thrust, power and mean inflow of each rotor (N,), with their derivatives by every number of the model.
+
+    The value is the solution's, whatever the model: give the solution's own, or a traced one with its numbers. One
+    linear solve for each direction (implicit function theorem). Raises InputError where the solution is not converged.
+    """
+    if not solution.converged:
+        raise InputError(f"Argument `solution` must be converged to have a derivative, but: {solution.why}")
+    x = jax.tree.map(jnp.asarray, _unknowns(solution))
+    with jax.ensure_compile_time_eval():  # the solution is at hand: nothing of this belongs into the caller's program
+        inverse = EachInverse(harmonic_inverse(solution.model.one(0), _mean(solution.state), several.slices))
+    x = attach(residual, x, several, method="gmres", precondition=lambda x, model: inverse)
+    driven = with_collectives(several, x.collective)
+    return loads_of(driven, evaluate(driven, x.wakes))
+
+
+def _share(several: SeveralWakes, coupling: float) -> SeveralWakes:
+    return eqx.tree_at(lambda s: s.coupling, several, jnp.asarray(coupling, several.places.dtype))
+
+
+def _newton(several: SeveralWakes, x: Together, linear: Krylov, tol: float) -> Outcome:
+    return newton(told, x, several, linear=linear, tol=tol, max_iterations=16)
+
+
+def _method(several: SeveralWakes, alone: Unknowns) -> Krylov:
+    """Newton's linear solver, helped by the inverse Jacobian of the first rotor alone, for each."""
+    return replace(METHOD, precondition=EachInverse(harmonic_inverse(several.one(0), alone, several.slices)))
+
+
+def _alone(several: SeveralWakes, progress: Progress | None, tol: float) -> tuple[list[Solution], int]:
+    """Each rotor's own wake; the next begins with the last one's."""
+    found: list[Solution] = []
+    for i in range(len(several)):
+        found.append(solve(several.one(i), found[-1] if found else None, progress, tol))
+        if not found[-1].converged:
+            found += [found[-1]] * (len(several) - i - 1)
+            break
+    return found, sum(one.iterations for one in found)
+
+
+def _outcome(several: SeveralWakes, alone: list[Solution]) -> Outcome:
+    """The rotors' own wakes as an outcome of the whole."""
+    wakes = jax.tree.map(lambda *a: jnp.stack(a), *(spread(one.unknowns, several.slices) for one in alone))
+    worst = max(alone, key=lambda one: one.residual)
+    x = Together(wakes, several.wakes.operating.collective)
+    return Outcome(x, worst.residual, (worst.residual,), 0, worst.converged, f"alone: {worst.why}", 0.0)
+
+
+def _unknowns(solution: SeveralSolution) -> Together:
+    state = solution.state
+    return Together(Unknowns(state.near, state.far, state.gamma_bound), solution.model.wakes.operating.collective)
+
+
+def _mean(state: WakeState) -> Unknowns:
+    """About the wake of the first rotor alone: its slices' mean."""
+    first = Unknowns(state.near[0], state.far[0], state.gamma_bound[0])
+    return jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), first)
+
+
+def _tell(progress: Progress | None, stage: str, found: Outcome) -> None:
+    if progress is not None:
+        progress(stage, found.residual)
+
+
+@eqx.filter_jit
+def _looked(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation, Any]:
+    moved, found = told(x, several)
+    return moved, found, loads_of(several, found)
+
+
+def _read(several: SeveralWakes, outcome: Outcome, iterations: int) -> SeveralSolution:
+    """Evaluate what a search ended with, and collect what a user wants of it."""
+    several = jax.tree.map(jnp.asarray, with_collectives(several, jnp.asarray(outcome.x.collective)))
+    moved, found, loads = _looked(outcome.x, several)
+    rotors = []
+    for i in range(len(several)):
+        wakes, evaluation = jax.tree.map(lambda a, i=i: a[i], (outcome.x.wakes, found))
+        one = readings(several.one(i), wakes, evaluation)
+        rotors.append(replace(one, converged=outcome.converged, why=outcome.why))
+    return SeveralSolution(
+        model=several,
+        state=found.state,
+        rotors=tuple(rotors),
+        converged=outcome.converged,
+        why=outcome.why,
+        residual=displacement(moved.wakes),
+        iterations=iterations,
+        CT=np.asarray(loads.thrust),
+        CP=np.asarray(loads.power),
+        CP_induced=np.asarray(loads.induced),
+        mean_inflow=np.asarray(loads.mean_inflow),
+    )

@@ -1,0 +1,123 @@
+"""Several rotors in one free wake: symmetries, limits, one solved coaxial pair and its derivative."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from wakes import COARSE
+
+import rotorjax as rj
+from rotorjax.errors import InputError
+from rotorjax.wake.equilibrium import evaluate, spread
+from rotorjax.wake.several import interference, several_wakes, velocity
+from rotorjax.wake.several_solution import performance_of, solve_several
+
+SETTINGS = rj.WakeSettings(**COARSE)
+THRUST = 0.006
+
+
+@pytest.fixture(scope="module")
+def uh60():
+    return rj.rotor("uh60", 18.0)
+
+
+@pytest.fixture(scope="module")
+def alone(uh60):
+    return rj.solve(rj.free_wake(*uh60, None, SETTINGS)).found
+
+
+@pytest.fixture(scope="module")
+def coaxial(uh60):
+    return rj.solve(several_wakes(*uh60, [(0, 0, 0), (0, 0, -0.2)], settings=SETTINGS, thrusts=THRUST))
+
+
+def of_each(alone, several):
+    """Every rotor in the wake of one alone."""
+    x = spread(alone.unknowns, several.slices)
+    return jax.vmap(lambda _: eqx.filter_jit(evaluate)(several.one(0), x).state)(jnp.arange(len(several)))
+
+
+def test_rotors_side_by_side_are_mirror_images(uh60, alone):
+    pair = several_wakes(*uh60, [(0, -1.2, 0), (0, 1.2, 0)], settings=SETTINGS, ground=rj.plane(2.0))
+    assert pair.slices == 8
+    left, right = np.asarray(eqx.filter_jit(interference)(pair, of_each(alone, pair)))
+    assert np.abs(left).max() > 1e-3
+    np.testing.assert_allclose(left, right, atol=1e-13)
+    points = np.random.default_rng(0).uniform(-1.5, 1.5, (6, 3)) - [0, 0, 0.4]
+    flow = eqx.filter_jit(velocity)
+    here, there = (np.asarray(flow(pair, of_each(alone, pair), jnp.asarray(p))) for p in (points, points * [1, -1, 1]))
+    np.testing.assert_allclose(here, there * [1, -1, 1], atol=1e-13)
+    ground = np.column_stack([points[:, :2], np.full(6, -2.0)])
+    np.testing.assert_allclose(flow(pair, of_each(alone, pair), jnp.asarray(ground))[:, 2], 0, atol=1e-14)
+
+
+def test_rotors_far_apart_leave_each_other_alone(uh60, alone):
+    """A wake from afar is a sink above and a source below: about A v/(4π d²) of its jet, here 2e-4 of the inflow."""
+    pair = several_wakes(*uh60, [(0, 0, 0), (20, 0, 0)], settings=SETTINGS)
+    added = np.asarray(eqx.filter_jit(interference)(pair, of_each(alone, pair)))
+    assert np.abs(added[..., 2]).max() < 1e-3 * float(alone.mean_inflow)
+
+
+def test_on_one_shaft_each_sees_the_mean_flow_of_the_other(uh60, alone):
+    """At the lower rotor's control points: the upper wake's velocity averaged over its own azimuth."""
+    pair = several_wakes(*uh60, [(0, 0, 0), (0, 0, -0.3)], settings=SETTINGS)
+    added = np.asarray(interference(pair, of_each(alone, pair)))[1, 0]
+    control = np.asarray(pair.one(1).control)
+    upper = rj.velocity(rj.solve(rj.free_wake(*uh60, None, SETTINGS)), jnp.asarray(control - [0, 0, 0.3]), instants=60)
+    np.testing.assert_allclose(added[: len(control), 2], np.asarray(upper)[:, 2], atol=2e-4)
+    # the frames are mirror images: what turns with the upper rotor turns against the lower one
+    np.testing.assert_allclose(added[: len(control), 1], -np.asarray(upper)[:, 1], atol=2e-4)
+
+
+def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial, alone):
+    """Less than one actuator disk would (√2), the lower rotor more than the upper one."""
+    assert coaxial.converged, coaxial.why
+    np.testing.assert_allclose(coaxial.CT, THRUST, rtol=1e-6)
+    ratio = coaxial.CP_induced / (alone.CP_induced * (THRUST / alone.CT) ** 1.5)
+    assert ratio[0] < ratio[1]
+    assert 1.2 < ratio.mean() < np.sqrt(2)
+    assert coaxial.collective_deg[0] < coaxial.collective_deg[1]
+
+
+def test_derivative_of_the_pairs_power_by_its_thrust(coaxial):
+    found = coaxial.found
+
+    def power(more):
+        model = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts + more)
+        return jnp.sum(performance_of(found, model).power)
+
+    step = 1e-4
+    there = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts + step)
+    back = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts - step)
+    difference = sum(s * solve_several(m, found, tol=1e-9).CP.sum() for s, m in ((1, there), (-1, back))) / (2 * step)
+    np.testing.assert_allclose(jax.jvp(jax.jit(power), (0.0,), (1.0,))[1], difference, rtol=1e-4)
+
+
+def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
+    coaxial.plot(tmp_path / "pair.png")
+    coaxial.to_vtk(tmp_path / "pair.vtp")
+    data = coaxial.to_xarray()
+    assert dict(data.sizes)["rotor"] == 2
+    np.testing.assert_allclose(data["CT"], THRUST, rtol=1e-6)
+    paths = coaxial.tip_vortices()
+    assert paths.shape[:2] == (2, 4)
+    assert np.all(paths[1, ..., 2].max(axis=1) < paths[0, ..., 2].max(axis=1))
+    assert (tmp_path / "pair.vtp").stat().st_size > 1000
+
+
+BAD = {
+    r"`places` must be finite and of shape \(N, 3\)": {"places": [(0, 0, 0)]},
+    "rotors 0 and 1 .* overlap": {"places": [(0, 0, 0), (1.5, 0, 0)]},
+    "`senses` must hold 2 numbers": {"senses": [1, 2]},
+    "`ground` must be level": {"ground": rj.plane(2.0, 10.0)},
+    "`places` must keep every disk above the ground": {"ground": rj.plane(0.1)},
+    "`collectives_deg` must be a number or 2 of them": {"collectives_deg": [1.0, 2.0, 3.0]},
+    "`thrusts` must be a number": {"thrusts": -0.01},
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_wrong_input_is_named(message, uh60):
+    with pytest.raises(InputError, match=message):
+        several_wakes(*uh60, **{"places": [(0, 0, 0), (0, 0, -0.2)], "settings": SETTINGS} | BAD[message])
