@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Bool, Float
 
 from rotorjax.checks import known
 from rotorjax.errors import InputError
@@ -107,8 +107,7 @@ def balance(
     thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. No tip
     loss beyond what the expansion has. Raises InputError where none is found, under jit an error at run time.
     """
-    flow = _flow(model, stations)
-    tau, found = _search(flow, model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
+    flow, tau, found = _sought(model, rotor, operating, stations, thrust)
     pitch = f"at {np.rad2deg(float(operating.collective)):g} deg " if known(operating.collective) else ""
     words = (
         f"Argument `collective` must give a loading that thrusts {'up' if thrust > 0 else 'down'}ward, but {pitch}no "
@@ -117,6 +116,20 @@ def balance(
     if known(found) and not bool(found):
         raise InputError(words)
     return _read(eqx.error_if(tau, ~found, words), flow, model, rotor, operating, stations)
+
+
+def attempt(
+    model: FiniteStateModel, rotor: Rotor, operating: OperatingPoint, stations: Stations, thrust: ArrayLike = FIRST_CT
+) -> tuple[Balance, Bool[Array, ""]]:
+    """As `balance`, but never refused: what the search ended with, and whether it is a balance. For batches by vmap."""
+    flow, tau, found = _sought(model, rotor, operating, stations, thrust)
+    return _read(tau, flow, model, rotor, operating, stations), found
+
+
+def _sought(model, rotor, operating, stations: Stations, thrust: ArrayLike) -> tuple["_Flow", Array, Array]:
+    flow = _flow(model, stations)
+    tau, found = _search(flow, model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
+    return flow, tau, found
 
 
 class _Flow(eqx.Module):
