@@ -3,7 +3,7 @@
 import hashlib
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_bytes
@@ -22,21 +22,9 @@ def write(path: str | Path, dataset: "xr.Dataset") -> None:
     It is made in memory, for on a full disk the HDF5 library ends the process, and sealed: at its end, where other
     readers of NetCDF do not look, stands a digest.
     """
-    content = packed(dataset)
+    packed = {k: {"zlib": True} for k, v in dataset.variables.items() if v.dtype.kind in "fi" and v.size > 64}
+    content = bytes(dataset.to_netcdf(engine="h5netcdf", encoding=packed))
     write_bytes(path, content + _seal(content))
-
-
-def packed(dataset: "xr.Dataset") -> bytes:
-    """A data set as the content of a NetCDF-4 file, arrays compressed."""
-    smaller = {k: {"zlib": True} for k, v in dataset.variables.items() if v.dtype.kind in "fi" and v.size > 64}
-    return bytes(dataset.to_netcdf(engine="h5netcdf", encoding=smaller))
-
-
-def unpacked(content: Any) -> "xr.Dataset":
-    """A data set of what `packed` made, bytes or an array of them."""
-    import xarray as xr
-
-    return xr.load_dataset(io.BytesIO(bytes(content)), engine="h5netcdf")
 
 
 def read(path: str | Path, *, sealed: bool = False) -> "xr.Dataset":

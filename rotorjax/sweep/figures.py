@@ -132,8 +132,9 @@ def _map(figure: Figure, panel: Axes, x: np.ndarray, y: np.ndarray, values: np.n
     levels = plotting.shared_levels([values[there]], 12)
     filled = panel.contourf(x, y, np.ma.masked_invalid(values), levels=levels, cmap="viridis")
     columns, lines = np.meshgrid(x, y)
-    panel.plot(columns[there], lines[there], ".", color="white", markersize=2)
-    panel.plot(columns[~there], lines[~there], "x", color=plotting.INK, markersize=4)
+    for of, mark, colour in ((there, ".", "white"), (~there, "x", plotting.INK)):
+        if of.any():
+            panel.plot(columns[of], lines[of], mark, markersize=4, clip_on=False, color=colour)
     panel.grid(False)
     figure.colorbar(filled, ax=panel)
 
@@ -169,14 +170,15 @@ def _series(data: xr.Dataset, along: str, axes: Sequence[str]) -> list[tuple[str
         return [("", first)]
     count = data.sizes[next_one]
     chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_CURVES)).round().astype(int))
-    return [(_value(next_one, float(first[next_one][k])), first.isel({next_one: int(k)})) for k in chosen]
+    found = [(_value(next_one, float(first[next_one][k])), first.isel({next_one: int(k)})) for k in chosen]
+    return [(label, one) for label, one in found if np.isfinite(one["CT"]).any()]
 
 
 def _value(name: str, value: float) -> str:
     if np.isinf(value):
         return "out of ground effect"
     symbol = {"height": "h", "slope_deg": "δ", "advance_ratio": "μ", "collective_deg": "θ₀"}.get(name, name)
-    return f"{symbol} = {value:.4g}" + ("°" if name.endswith("_deg") else "")
+    return f"{symbol} = {value:.6g}" + ("°" if name.endswith("_deg") else "")
 
 
 def _legend(panel: Axes, series: Sequence[tuple[str, xr.Dataset]]) -> None:

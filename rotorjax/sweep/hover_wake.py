@@ -10,8 +10,7 @@ from rotorjax.bench.disk_fit import disk_fit
 from rotorjax.bench.settings import StudySettings, settings_of
 from rotorjax.bench.single import Solver as WakeSolver
 from rotorjax.bench.single import check_case
-from rotorjax.bench.wake_file import lost_at, model_of, to_dataset, to_solution
-from rotorjax.io.netcdf import packed, unpacked
+from rotorjax.bench.wake_file import lost_at, model_of, start_of, state_arrays, to_dataset
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import Point
 from rotorjax.sweep.found import Found, Progress, Start, dimensional, from_best, hover_figure, judged
@@ -59,10 +58,10 @@ def solve(
 
 
 def _solve(wanted: WakeHover, near: Start | None, progress: Progress | None, solver: WakeSolver) -> Found:
-    begin = None if near is None else to_solution(unpacked(near.found.state["file"]), near.prepared.settings)
+    begin = None if near is None else start_of(near.prepared.case, near.prepared.settings, near.found.state)
     found = solver(model_of(wanted.case, wanted.settings), begin, progress)
-    data = to_dataset(wanted.case, found, wanted.settings)
-    lost, climb = lost_at(data), wanted.settings.climb_ratio
+    lost = None if found.converged else lost_at(to_dataset(wanted.case, found, wanted.settings))
+    climb = wanted.settings.climb_ratio
     CT, CP = float(found.CT), float(found.CP)
     fit = disk_fit(found.r, found.widths, found.psi, np.asarray(found.inflow) - climb)
     values = {
@@ -79,5 +78,5 @@ def _solve(wanted: WakeHover, near: Start | None, progress: Progress | None, sol
         "wall_time_s": float(found.wall_time_s),
     }
     why = found.why if lost is None else f"lost at {lost}: {found.why}"
-    state = {"file": np.frombuffer(packed(data), np.uint8)} if found.converged else {}
+    state = state_arrays(found) if found.converged else {}
     return judged(values, state, found.converged, lost is None, float(found.load_change), why)

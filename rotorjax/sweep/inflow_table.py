@@ -20,6 +20,7 @@ from rotorjax.checks import closest, known, number_of
 from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_text
 from rotorjax.io.reading import read_text
+from rotorjax.io.terminal import spelt
 from rotorjax.sweep.found import CONVERGED
 from rotorjax.sweep.table import axes_of
 
@@ -169,11 +170,13 @@ def check_axes(axes: dict[str, Sequence[float] | np.ndarray], kind: str) -> None
 def write_table(path: str | Path, data: xr.Dataset) -> None:
     """Write a sweep's table as text. Raises InputError as `tabulated` does, or where it cannot be written."""
     made = tabulated(data)
-    about = [f"{name}: {data[name].attrs['long_name']}, {data[name].attrs['units']}" for name in made.names]
+    about = [
+        made.title,
+        *(f"{name}: {data[name].attrs['long_name']}, {data[name].attrs['units']}" for name in made.names),
+    ]
     lines = [
         MAGIC,
-        f"# {made.title}",
-        *(f"# {line}" for line in about),
+        *("# " + "".join(map(spelt, line)) for line in about),
         "# induced inflow over Omega R, down: lambda_0 + lambda_1c r cos psi + lambda_1s r sin psi, psi = 0 aft",
         "# CT = T/(rho A (Omega R)^2), CQ = Q/(rho A (Omega R)^2 R); one line a point, the last axis fastest",
         f"axes {len(made.names)}",

@@ -139,7 +139,7 @@ class Cluster:
                 self._cluster = distributed.LocalCluster(
                     n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=40
                 )
-            self._client = distributed.Client(self._cluster or address, timeout=10)
+            self._client = distributed.Client(self._cluster or address, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
                 f"Argument `scheduler` must be the address of a running Dask scheduler or 'local', but {address!r} is "
@@ -159,7 +159,8 @@ class Cluster:
 
     def finished(self) -> list[tuple[Any, Any]]:
         """Results of those that are done."""
-        done = require_distributed().wait(list(self._futures), return_when="FIRST_COMPLETED").done
+        with self._client.as_current():  # not by default: xarray would ask it for locks on every file
+            done = require_distributed().wait(list(self._futures), return_when="FIRST_COMPLETED").done
         return [(self._futures.pop(future), unpacked(future.result())) for future in done]
 
     def close(self) -> None:
