@@ -67,8 +67,8 @@ def killed(case: Path, out: Path, kills: int, jobs: int, longest: float) -> int:
     line = command("sweep", "--case", str(case), "--out", str(out), "--jobs", str(jobs))
     for _ in range(kills):
         process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        before, begin = len(list(out.glob("points/*.nc"))), time.perf_counter()
-        while process.poll() is None and time.perf_counter() - begin < longest:
+        before, begin, patience = len(list(out.glob("points/*.nc"))), time.perf_counter(), chance.uniform(0.3, 1.0)
+        while process.poll() is None and time.perf_counter() - begin < patience * longest:
             time.sleep(0.01)
             if len(list(out.glob("points/*.nc"))) > before:
                 break

@@ -245,5 +245,7 @@ def _check_wake(case: SweepCase) -> None:
     if case.model != FREE_WAKE and (case.wake or "quick" in case.fixed):
         what = "[wake]" if case.wake else "[case] quick"
         raise InputError(f"{what} must come with the free wake, but the inflow is that of {case.model}")
+    if case.model != "vpbfsm" and "harmonics" in case.fixed:
+        raise InputError(f"[case] harmonics must come with model = 'vpbfsm', but the model is '{case.model}'")
     if case.model == FREE_WAKE:
         wake_settings(**case.wake)

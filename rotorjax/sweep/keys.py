@@ -58,18 +58,23 @@ def quantity(name: str, command: Command) -> Quantity:
         if name in NUMBERS[command]:
             return NUMBERS[command][name]
         raise InputError(f"[axes] has the unknown key '{name}' for {command}: {closest(name, every(command))}")
-    found = SCHEMA.get(table, {}).get(key)
-    if found is None or found.kind not in ("number", "whole number", "stations"):
+    if name in _ELSEWHERE:
+        raise InputError(f"[axes] {name} must be left out, but is varied: take {_ELSEWHERE[name]}")
+    if name not in every(command):
         raise InputError(f"[axes] has the unknown key '{name}' for {command}: {closest(name, every(command))}")
-    if key in ("collective_deg", "climb"):
-        raise InputError(f"[axes] {name} must be left to the case, but is varied: it has {key} of its own")
+    found = SCHEMA[table][key]
     return Quantity(found.range.unit or "1", f"[{table}] {key} of the rotor file", found.range)
 
 
 def every(command: Command) -> list[str]:
     """Names of all that a command's sweep may vary."""
     rotor = [f"{t}.{k}" for t, keys in SCHEMA.items() for k, key in keys.items() if key.kind in _KINDS]
-    return [*NUMBERS[command], *(name for name in rotor if not name.startswith(("operating.coll", "operating.climb")))]
+    return [*NUMBERS[command], *(name for name in rotor if name not in _ELSEWHERE)]
 
 
 _KINDS = ("number", "whole number", "stations")
+_ELSEWHERE = {
+    "operating.collective_deg": "collective_deg or a thrust",
+    "operating.climb": "climb",
+    "rotor.twist_deg": "rotor.linear_twist_deg, for one number of twist_deg only adds to the collective",
+}
