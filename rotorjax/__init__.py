@@ -29,6 +29,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "over_deck": "rotorjax.api.applications",
     "save_mat": "rotorjax.ode.export",
     "to_control": "rotorjax.ode.export",
+    "inflow_table": "rotorjax.sweep.inflow_table",
     "InputError": "rotorjax.errors",
     "plane": "rotorjax.ground",
     "OperatingPoint": "rotorjax.operating",
@@ -42,8 +43,8 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "flight_settings": "rotorjax.wake.settings",
     "quick_settings": "rotorjax.wake.settings",
 }
-# `rotor` and `trim` are rooms too: called, they are the door's functions of that name (their __init__.py)
-_CALLED_ROOMS = ("rotor", "trim")
+# `rotor`, `trim` and `sweep` are rooms too: called, they are the door's functions of that name (their __init__.py)
+_CALLED_ROOMS = ("rotor", "trim", "sweep")
 __all__ = [*_DOOR, *_CALLED_ROOMS]  # pyright: ignore[reportUnsupportedDunderAll]
 
 

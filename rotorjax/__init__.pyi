@@ -4,6 +4,7 @@ from rotorjax.api.applications import linearise as linearise
 from rotorjax.api.applications import march as march
 from rotorjax.api.applications import over_deck as over_deck
 from rotorjax.api.applications import simulate as simulate
+from rotorjax.api.applications import sweep as sweep
 from rotorjax.api.applications import trim as trim
 from rotorjax.api.models import finite_state as finite_state
 from rotorjax.api.models import rotor as rotor
@@ -21,6 +22,8 @@ from rotorjax.operating import operating_point as operating_point
 from rotorjax.potential.model import steady_state
 from rotorjax.rotor.catalogue import names as names
 from rotorjax.rotor.geometry import rotor as _rotor
+from rotorjax.sweep.inflow_table import InflowTable as InflowTable
+from rotorjax.sweep.inflow_table import inflow_table as inflow_table
 from rotorjax.wake.model import free_wake as free_wake
 from rotorjax.wake.settings import WakeSettings as WakeSettings
 from rotorjax.wake.settings import flight_settings as flight_settings

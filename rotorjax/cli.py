@@ -28,12 +28,24 @@ class Parser(argparse.ArgumentParser):
 
 def parser() -> argparse.ArgumentParser:
     """The parser of all commands; each module of `rotorjax.commands` registers its own."""
-    from rotorjax.commands import calibrate, deck, doctor, inflow, linearise, new, simulate, study, trim, validate
+    from rotorjax.commands import (
+        calibrate,
+        deck,
+        doctor,
+        inflow,
+        linearise,
+        new,
+        simulate,
+        study,
+        sweep,
+        trim,
+        validate,
+    )
 
     top = Parser(prog="rotorjax", description="Rotor inflow near the ground: finite-state model and free vortex wake.")
     top.add_argument("--version", action="version", version=f"rotorjax {__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
-    for module in (study, inflow, trim, simulate, linearise, validate, calibrate, deck, new, doctor):
+    for module in (study, inflow, trim, sweep, simulate, linearise, validate, calibrate, deck, new, doctor):
         module.register(commands)
     return top
 

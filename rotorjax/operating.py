@@ -1,5 +1,7 @@
 """The operating point: what the rotor is doing and the air it does it in. SI throughout."""
 
+from typing import NamedTuple
+
 import equinox as eqx
 from jaxtyping import Array, Float
 
@@ -69,3 +71,30 @@ def operating_point(
     for name, value in fields.items():
         check_range(name, value, RANGES[name])
     return OperatingPoint(**{name: array(value) for name, value in fields.items()})
+
+
+ALTITUDE = Range(-1000.0, 11_000.0, "m", hint="above, the standard atmosphere is another one: give the density")
+
+
+class Air(NamedTuple):
+    """density (kg/m³). sound_speed (m/s). viscosity: kinematic (m²/s)."""
+
+    density: float
+    sound_speed: float
+    viscosity: float
+
+
+def standard_air(altitude: float) -> Air:
+    """The ISA (ISO 2533) at a geopotential altitude in m, up to the tropopause; viscosity by Sutherland's formula.
+
+    Raises InputError beyond −1000 to 11 000 m.
+
+    >>> f"{standard_air(2000.0).density:.4f}"
+    '1.0065'
+    """
+    check_range("altitude", altitude, ALTITUDE)
+    temperature = 288.15 - 0.0065 * altitude
+    gas = 287.05287
+    density = 101_325 / (gas * 288.15) * (temperature / 288.15) ** (9.80665 / (0.0065 * gas) - 1)
+    dynamic = 1.458e-6 * temperature**1.5 / (temperature + 110.4)
+    return Air(density, (1.4 * gas * temperature) ** 0.5, dynamic / density)

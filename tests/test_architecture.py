@@ -16,7 +16,7 @@ FLOORS = (  # from the ground up; a room may import from lower floors, and from 
     ("limits",),
     ("coupled_wake", "coupled"),
     ("bench",),
-    ("trim", "calibration", "simulation", "linearisation", "deck"),
+    ("trim", "calibration", "simulation", "linearisation", "deck", "sweep"),
     ("study", "validation"),
     ("api",),
     ("commands",),

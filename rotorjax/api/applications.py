@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rotorjax.ode.models import LinearModel, PeriodicModel
     from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
+    from rotorjax.sweep.case import SweepCase
     from rotorjax.trim.run import Result
 
 Progress = Callable[[str, float], None]
@@ -97,6 +98,32 @@ def simulate(case: str | Path, progress: Callable[[str], None] | None = None) ->
     from rotorjax.simulation.run import fly
 
     return fly(read_case(case), progress)
+
+
+def sweep(case: "str | Path | SweepCase", folder: str | Path, jobs: int = 1) -> "xr.Dataset":
+    """Solve a case over its axes (`sweep.case` shows a file; `sweep.case.sweep_case` makes one in Python).
+
+    Finished points are kept in the folder, where the same call continues. jobs: processes; more than one needs a main
+    module that can be imported (`if __name__ == "__main__"`). Returns the table with a dimension for each axis and
+    `verdict` beside the numbers, which are NaN where there is no solution. Raises InputError for a case that is not
+    right or of which no point is allowed.
+
+    >>> import tempfile, rotorjax as rj
+    >>> from rotorjax.sweep.case import sweep_case
+    >>> speeds = sweep_case("trim", {"advance_ratio": [0.0, 0.1]}, inflow="uniform", weight=72e3)
+    >>> table = rj.sweep(speeds, tempfile.mkdtemp())
+    >>> bool(table.CP.sel(advance_ratio=0.1) < table.CP.sel(advance_ratio=0.0))
+    True
+    """
+    from rotorjax.checks import check_whole
+    from rotorjax.sweep.case import SweepCase, read_case
+    from rotorjax.sweep.pools import Processes
+    from rotorjax.sweep.run import sweep
+    from rotorjax.sweep.table import dataset
+
+    check_whole("jobs", jobs, 1, 1024)
+    wanted = case if isinstance(case, SweepCase) else read_case(case)
+    return dataset(sweep(wanted, folder, pool=None if jobs == 1 else lambda line: Processes(jobs, line.say)))
 
 
 def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) -> "March":

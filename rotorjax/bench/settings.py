@@ -86,10 +86,23 @@ def study_settings(
     paper's). climb_ratio: climb velocity over ΩR. quick: the coarser free wake. flapping: blades free to flap,
     where the rotor has hinge data; rigid otherwise. Raises InputError where a value is not allowed.
     """
+    return settings_of(*catalogue.load(rotor), collective_deg, climb_ratio, harmonics, quick, flapping, **wake)
+
+
+def settings_of(
+    body: Rotor,
+    operating: OperatingPoint,
+    collective_deg: float | None = None,
+    climb_ratio: float = 0.0,
+    harmonics: int = 1,
+    quick: bool = False,
+    flapping: bool = False,
+    **wake: Any,
+) -> StudySettings:
+    """Make settings as `study_settings` does, of a rotor that is loaded and its operating point."""
     check_number("climb", climb_ratio, -0.5, 0.5)
     if harmonics != int(harmonics) or not 1 <= harmonics <= 4:
         raise InputError(f"Argument `harmonics` must be a whole number from 1 to 4, but is {harmonics}")
-    body, operating = catalogue.load(rotor)
     if collective_deg is not None:
         check_number("collective", collective_deg, -90.0, 90.0)
         operating = eqx.tree_at(lambda o: o.collective, operating, jnp.deg2rad(jnp.asarray(collective_deg, float)))

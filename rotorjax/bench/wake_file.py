@@ -149,6 +149,19 @@ def to_solution(data: xr.Dataset, settings: StudySettings) -> Solution:
     return Solution(**{name: value for name, value in fields.items() if name in Solution.__dataclass_fields__})
 
 
+def state_arrays(solution: Solution) -> dict[str, np.ndarray]:
+    """The wake's state by name: all that a neighbour's search needs of a solution besides its case and settings."""
+    return {name: np.asarray(getattr(solution.state, name)) for name in WakeState.__dataclass_fields__}
+
+
+def start_of(case: Case, settings: StudySettings, state: dict[str, np.ndarray]) -> Solution:
+    """A converged solution of a case from its `state_arrays`, to start a neighbour from; nothing can be read off it."""
+    unread: dict[str, Any] = dict.fromkeys(Solution.__dataclass_fields__, _NO_VALUE)
+    wake = WakeState(**{name: jnp.asarray(values) for name, values in state.items()})
+    known = {"model": model_of(case, settings), "state": wake, "converged": True, "why": "kept", "residuals": ()}
+    return Solution(**unread | known)
+
+
 def _unit(about: str) -> str:
     if " in rad" in about:
         return "rad"

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from rotorjax.calibration.calibration_file import Calibration
     from rotorjax.operating import OperatingPoint
     from rotorjax.rotor.geometry import Rotor
+    from rotorjax.trim.run import Request
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -29,6 +30,33 @@ def add_place(parser: argparse.ArgumentParser, several: bool = False) -> None:
     parser.add_argument("--height", type=float, nargs="+" if several else None, metavar="H", help=about)
     parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
+
+
+def add_flight(parser: argparse.ArgumentParser, required: bool) -> None:
+    """Thrust, speed and air, each by its coefficient or as users have it; required: the thrust."""
+    thrust = parser.add_mutually_exclusive_group(required=required)
+    thrust.add_argument("--thrust-coefficient", type=float, metavar="CT", help="T/(ρA(ΩR)²), along the shaft")
+    thrust.add_argument("--weight", type=float, metavar="N", help="thrust in newtons")
+    speed = parser.add_mutually_exclusive_group()
+    speed.add_argument("--advance-ratio", type=float, nargs="+", metavar="MU", help="horizontal speed over ΩR (0)")
+    speed.add_argument("--speed", type=float, nargs="+", metavar="V", help="horizontal speed in m/s")
+    air = parser.add_mutually_exclusive_group()
+    air.add_argument("--altitude", type=float, metavar="M", help="in the standard atmosphere (the rotor file's air)")
+    air.add_argument("--density", type=float, metavar="RHO", help="of the air in kg/m³")
+
+
+def flown(chosen: argparse.Namespace, base: "Request") -> "tuple[Request, list[float]]":
+    """A request with the air and the thrust that `add_flight` asks for, and its advance ratios."""
+    from dataclasses import replace
+
+    from rotorjax.bench.as_flown import advance_ratio, in_air, thrust_coefficient
+
+    rotor, operating = base.rotor, in_air(base.operating, chosen.altitude, chosen.density)
+    thrust = chosen.thrust_coefficient
+    if thrust is None:
+        thrust = thrust_coefficient(chosen.weight, rotor, operating)
+    speeds = chosen.advance_ratio or [advance_ratio(speed, rotor, operating) for speed in chosen.speed or [0.0]]
+    return replace(base, operating=operating, thrust=thrust), speeds
 
 
 def case_of(chosen: argparse.Namespace) -> "Case":

@@ -1,12 +1,11 @@
 """`rotorjax linearise`: linear state-space models of the whole rotor about a trim, or of a rigid rotor's free wake."""
 
 import argparse
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotorjax.commands.arguments import add_place, add_rotor
+from rotorjax.commands.arguments import add_flight, add_place, add_rotor
 
 if TYPE_CHECKING:
     from rotorjax.trim.run import Request
@@ -24,12 +23,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     add = parser.add_argument
     add_rotor(parser)
-    thrust = parser.add_mutually_exclusive_group()
-    thrust.add_argument("--thrust-coefficient", type=float, metavar="CT", help="T/(ρA(ΩR)²), along the shaft")
-    thrust.add_argument("--weight", type=float, metavar="N", help="thrust in newtons")
-    speed = parser.add_mutually_exclusive_group()
-    speed.add_argument("--advance-ratio", type=float, nargs="+", metavar="MU", help="horizontal speed over ΩR (0)")
-    speed.add_argument("--speed", type=float, nargs="+", metavar="V", help="horizontal speed in m/s")
+    add_flight(parser, required=False)
     add_place(parser, several=True)
     add("--tilt", type=float, default=0.0, metavar="DEG", help="shaft forward (0)")
     add("--inflow", metavar="MODEL", help="uniform, pitt-peters, vpbfsm (pitt-peters; without a thrust freewake)")
@@ -98,6 +92,7 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
     """One trim for every speed and height."""
     from dataclasses import replace
 
+    from rotorjax.commands.arguments import flown
     from rotorjax.errors import InputError
     from rotorjax.trim.run import FREE_WAKE, request
 
@@ -114,12 +109,7 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
         climb=chosen.climb,
         tilt_deg=chosen.tilt,
     )
-    radius, tip = float(base.rotor.radius), float(base.operating.tip_speed(base.rotor.radius))
-    thrust = chosen.thrust_coefficient
-    if thrust is None:
-        thrust = chosen.weight / (float(base.operating.density) * math.pi * radius**2 * tip**2)
-    base = replace(base, thrust=thrust)
-    speeds = chosen.advance_ratio or [v / tip for v in chosen.speed or [0.0]]
+    base, speeds = flown(chosen, base)
     return [replace(base, advance=mu, height=h) for h in chosen.height or [None] for mu in speeds]
 
 
@@ -174,7 +164,7 @@ def _only_the_wake(chosen: argparse.Namespace) -> None:
     """Raise InputError for what a wake of rigid blades does not have; one height is no list of them."""
     from rotorjax.errors import InputError
 
-    usual = {"advance_ratio": None, "speed": None, "tilt": 0.0, "azimuths": None}
+    usual = {"advance_ratio": None, "speed": None, "altitude": None, "density": None, "tilt": 0.0, "azimuths": None}
     _refuse(chosen, usual, "needs a trim: give --thrust-coefficient or --weight")
     if chosen.inflow not in (None, "freewake"):
         raise InputError(

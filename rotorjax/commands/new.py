@@ -10,6 +10,7 @@ TRY = {
     "simulate": "rotorjax simulate --case {0}/case.toml --out {0}/out",
     "gust": "rotorjax simulate --case {0}/case.toml --out {0}/out",
     "freewake": "rotorjax simulate --case {0}/case.toml --out {0}/out",
+    "sweep": "rotorjax sweep --case {0}/case.toml --out {0}/out --table {0}/out/table.txt",
     "deck": "rotorjax deck --case {0}/case.toml --out {0}/out",
 }
 
@@ -20,8 +21,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         "new",
         help="a rotor or a case to begin with",
         description="Write a commented rotor file or case and say how to run it: rotor (three blades, every key), "
-        "simulate (a step of collective close to the ground), gust, freewake (a step with the free wake), deck (a "
-        "landing). Files that are there are not replaced.",
+        "simulate (a step of collective close to the ground), gust, freewake (a step with the free wake), sweep "
+        "(heights and slopes), deck (a landing). Files that are there are not replaced.",
     )
     parser.add_argument("kind", choices=tuple(TRY), help="what to write")
     parser.add_argument("folder", type=Path, metavar="DIR", help="where")

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from rotorjax.commands.arguments import add_flight
+
 
 def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
@@ -15,8 +17,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     add = parser.add_argument
     add("--rotor", default="uh60", metavar="NAME|FILE", help="catalogue name or TOML file (uh60)")
-    add("--thrust-coefficient", required=True, type=float, metavar="CT", help="T/(ρA(ΩR)²), along the shaft")
-    add("--advance-ratio", type=float, nargs="+", default=[0.0], metavar="MU", help="horizontal speed over ΩR (0)")
+    add_flight(parser, required=True)
     add("--height", type=float, nargs="+", metavar="H", help="hub over ground, over R (none: out of ground effect)")
     add("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     add("--climb", type=float, default=0.0, metavar="V", help="vertical speed over ΩR (0)")
@@ -35,7 +36,7 @@ def register(commands: argparse._SubParsersAction) -> None:
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
     from rotorjax.bench.single_output import check_picture
-    from rotorjax.commands.arguments import introduce
+    from rotorjax.commands.arguments import flown, introduce
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
     from rotorjax.trim.curve import curve, requests
@@ -43,7 +44,7 @@ def run(chosen: argparse.Namespace) -> int:
 
     base = request(
         rotor=chosen.rotor,
-        thrust=chosen.thrust_coefficient,
+        thrust=1e-3,
         inflow=chosen.inflow,
         slope_deg=chosen.slope,
         climb=chosen.climb,
@@ -51,7 +52,8 @@ def run(chosen: argparse.Namespace) -> int:
         drag_area=chosen.drag_area,
         aim=chosen.aim,
     )
-    speeds, heights = chosen.advance_ratio, [None] if chosen.height is None else chosen.height
+    base, speeds = flown(chosen, base)
+    heights = [None] if chosen.height is None else chosen.height
     wanted = requests(base, speeds, heights)
     check_picture(chosen.plot)
     if chosen.plot is not None and len(wanted) == 1:

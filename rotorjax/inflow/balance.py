@@ -6,7 +6,7 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from rotorjax.checks import known
 from rotorjax.errors import InputError
@@ -107,7 +107,7 @@ def balance(
     thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. No tip
     loss beyond what the expansion has. Raises InputError where none is found, under jit an error at run time.
     """
-    flow = _flow(model, stations)
+    flow = flow_of(model, stations)
     tau, found = _search(flow, model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
     pitch = f"at {np.rad2deg(float(operating.collective)):g} deg " if known(operating.collective) else ""
     words = (
@@ -119,7 +119,7 @@ def balance(
     return _read(eqx.error_if(tau, ~found, words), flow, model, rotor, operating, stations)
 
 
-class _Flow(eqx.Module):
+class Flow(eqx.Module):
     """unit: of a model. at (M, K, R): inflow of unit rotor states at the stations."""
 
     unit: UnitStates
@@ -127,13 +127,27 @@ class _Flow(eqx.Module):
 
 
 @eqx.filter_jit
-def _flow(model: FiniteStateModel, stations: Stations) -> _Flow:
+def flow_of(model: FiniteStateModel, stations: Stations) -> Flow:
+    """The costly part of a balance, which neither blades nor loads change."""
     unit = unit_states(model)
-    return _Flow(unit, unit_inflow(model, unit, *stations.xy))
+    return Flow(unit, unit_inflow(model, unit, *stations.xy))
+
+
+def attempt(
+    flow: Flow,
+    model: FiniteStateModel,
+    rotor: Rotor,
+    operating: OperatingPoint,
+    stations: Stations,
+    thrust: Float[Array, ""],
+) -> tuple[Balance, Bool[Array, ""]]:
+    """As `balance`, but never refused: what the search ended with, and whether it is a balance. For batches by vmap."""
+    tau, found = _search(flow, model, rotor, operating, stations, thrust)
+    return _read(tau, flow, model, rotor, operating, stations), found
 
 
 @eqx.filter_jit
-def _search(flow: _Flow, model, rotor, operating, stations: Stations, thrust):
+def _search(flow: Flow, model, rotor, operating, stations: Stations, thrust):
     """Pressure terms in balance, and whether they are and thrust as the first ones do."""
     start = jnp.zeros(len(model.modes), stations.r.dtype).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * thrust)
     climb = operating.climb_ratio(rotor.radius)
@@ -146,7 +160,7 @@ def _search(flow: _Flow, model, rotor, operating, stations: Stations, thrust):
 
 
 @eqx.filter_jit
-def _read(tau, flow: _Flow, model, rotor, operating, stations: Stations) -> Balance:
+def _read(tau, flow: Flow, model, rotor, operating, stations: Stations) -> Balance:
     climb = operating.climb_ratio(rotor.radius)
     state = axial_state(model, tau, climb, flow.unit)
     induced = jnp.tensordot(state.a, flow.at, 1)

@@ -50,18 +50,20 @@ def read_toml(
     build: Callable[[Tables, Path], T],
     names: Mapping[str, str] | None = None,
     optional: tuple[str, ...] = (),
+    changes: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> T:
     """Read a file and make something of its tables: build(tables, folder of the file).
 
     Tables hold what the file gives, numbers as floats. A table with required keys must be there unless it is among the
-    optional ones. names: the file's key for an argument of another name that `build` may refuse.
+    optional ones. names: the file's key for an argument of another name that `build` may refuse. changes: values by
+    table and key that stand in place of the file's and are checked as these are; None leaves a key out.
 
     Raises InputError, naming file, key and value, for a file that is not there, not UTF-8 or not TOML, tables and keys
     that are unknown, misspelt or missing, values of the wrong type or out of range, and whatever `build` raises.
     """
     path, text = Path(path), read_text(path)
     try:
-        tables = _checked(_parse(text), schema, optional)
+        tables = _checked(_changed(_parse(text), changes or {}), schema, optional)
         return build(tables, path.parent)
     except ArgumentError as error:
         raise InputError(f"{path}: {error.under(_own_key(error.name, schema, names or {}))}") from None
@@ -76,6 +78,13 @@ def _parse(text: str) -> dict[str, Any]:
         raise InputError("the file must be TOML, but its brackets are nested too deeply") from None
     except ValueError as error:  # TOMLDecodeError, and integers of more digits than Python reads
         raise InputError(f"the file must be TOML, but is not: {str(error).splitlines()[0][:200]}") from None
+
+
+def _changed(data: dict[str, Any], changes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    for table, values in changes.items():
+        if isinstance(old := data.get(table, {}), dict):
+            data = {**data, table: {k: v for k, v in {**old, **values}.items() if v is not None}}
+    return data
 
 
 def _checked(data: dict[str, Any], schema: Schema, optional: tuple[str, ...]) -> Tables:

@@ -4,8 +4,10 @@ rotor, operating = load("uh60")
 rotor, operating = load("my_rotor.toml")
 """
 
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import jax
 
@@ -21,28 +23,33 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _folder().glob("*.toml")))
 
 
-def load(name_or_path: str | Path) -> tuple[Rotor, OperatingPoint]:
+Changes = Mapping[str, Mapping[str, Any]]
+
+
+def load(name_or_path: str | Path, changes: Changes | None = None) -> tuple[Rotor, OperatingPoint]:
     """Load a rotor, its aerofoil inside, and its nominal operating point: by name, or from one's own TOML file.
 
-    Anything that ends in .toml or is a `Path` is read as a file. Raises InputError for a name that the catalogue does
-    not have, with the closest one, and whatever `read_rotor` raises for a file.
+    Anything that ends in .toml or is a `Path` is read as a file. changes: as `read_rotor` takes them.
+
+    Raises InputError for a name that the catalogue does not have, with the closest one, and whatever `read_rotor`
+    raises for a file.
     """
     path = name_or_path
     if isinstance(path, Path) or (isinstance(path, str) and path.endswith(".toml")):
-        return _read(path)
+        return _read(path, changes)
     if name_or_path not in names():
         hint = closest(str(name_or_path), names())
         raise InputError(
             f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is "
             f"{shown(name_or_path)}: {hint}"
         )
-    return _read(_folder() / f"{name_or_path}.toml")
+    return _read(_folder() / f"{name_or_path}.toml", changes)
 
 
-def _read(path: str | Path) -> tuple[Rotor, OperatingPoint]:
+def _read(path: str | Path, changes: Changes | None) -> tuple[Rotor, OperatingPoint]:
     """Read a file into concrete numbers, inside of jit too."""
     with jax.ensure_compile_time_eval():
-        return read_rotor(path)
+        return read_rotor(path, changes)
 
 
 def _folder() -> Path:

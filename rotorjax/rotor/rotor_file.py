@@ -11,6 +11,7 @@ that would have no effect beside the others. Further keys:
     full_range = "flat plate"    # beyond the table's angles, where no full_range_file is at hand
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -79,14 +80,25 @@ _NAMES = {
 }
 
 
-def read_rotor(path: str | Path) -> tuple[geometry.Rotor, OperatingPoint]:
+_EITHER = {"twist_deg": "linear_twist_deg", "linear_twist_deg": "twist_deg"}
+
+
+def read_rotor(
+    path: str | Path, changes: Mapping[str, Mapping[str, Any]] | None = None
+) -> tuple[geometry.Rotor, OperatingPoint]:
     """Read a rotor and its nominal operating point from a TOML file.
+
+    changes: values by table and key in place of the file's, as {"rotor": {"chord": 0.5}}; a linear twist takes the
+    place of a table of twist, and the other way round.
 
     Raises InputError, naming file, key and value, for a file that is not there or not TOML, a key that is missing,
     misspelt, of the wrong type or without effect beside the others, a value out of range, a table that has gaps or does
     not cover the blade, and a rotor whose solidity or tip Mach number no rotor has.
     """
-    return read_toml(path, SCHEMA, _build, _NAMES, optional=("hinge",))
+    changed = {table: dict(values) for table, values in (changes or {}).items()}
+    for key in _EITHER.keys() & changed.get("rotor", {}).keys():
+        changed["rotor"].setdefault(_EITHER[key], None)
+    return read_toml(path, SCHEMA, _build, _NAMES, optional=("hinge",), changes=changed)
 
 
 def _build(data: Tables, folder: Path) -> tuple[geometry.Rotor, OperatingPoint]:

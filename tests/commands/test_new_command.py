@@ -25,6 +25,17 @@ def test_what_is_written_runs_as_it_is_told(kind, tmp_path, capsys):
         assert json.loads((folder / "out" / "report.json").read_text())["histories"]
 
 
+def test_a_sweep_is_read_and_shows_every_key(tmp_path):
+    """tests/sweep runs one like it."""
+    from rotorjax.sweep.case import SCHEMA, read_case
+
+    assert main(["new", "sweep", str(tmp_path)]) == 0
+    assert [axis.name for axis in read_case(tmp_path / "case.toml").axes] == ["height", "slope_deg"]
+    text = (tmp_path / "case.toml").read_text()
+    shown = {**SCHEMA["case"], **SCHEMA["design"]}
+    assert not [key for key in shown if key not in text]
+
+
 @pytest.mark.parametrize("kind", ["gust", "freewake"])
 def test_what_takes_longer_is_read_and_allowed(kind, tmp_path):
     from rotorjax.simulation.case import read_case

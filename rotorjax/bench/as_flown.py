@@ -1,0 +1,48 @@
+"""Weight, speed and air as users have them, beside C_T and μ: one place for trims, linear models and sweeps."""
+
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from rotorjax.checks import Range, check_range
+from rotorjax.errors import InputError
+from rotorjax.operating import RANGES, OperatingPoint, standard_air
+from rotorjax.rotor.geometry import Rotor
+
+WEIGHT = Range(0.0, 1e7, "N", above=True)
+SPEED = Range(0.0, 400.0, "m/s")
+
+
+def in_air(operating: OperatingPoint, altitude: float | None = None, density: float | None = None) -> OperatingPoint:
+    """The operating point in the standard atmosphere at an altitude (m), or in air of a density (kg/m³).
+
+    With neither it stays as it is. Raises InputError where both are given or one is out of range.
+    """
+    if altitude is not None and density is not None:
+        raise InputError(f"Argument `density` must be left out with an altitude, but is {density:g}")
+    if altitude is not None:
+        return eqx.tree_at(
+            lambda o: (o.density, o.sound_speed, o.viscosity), operating, _arrays(standard_air(altitude))
+        )
+    if density is None:
+        return operating
+    check_range("density", density, RANGES["density"])
+    return eqx.tree_at(lambda o: o.density, operating, *_arrays((density,)))
+
+
+def thrust_coefficient(weight: float, rotor: Rotor, operating: OperatingPoint) -> float:
+    """C_T of a thrust in N along the shaft. Raises InputError where it is not positive."""
+    check_range("weight", weight, WEIGHT)
+    radius, tip = float(rotor.radius), float(operating.tip_speed(rotor.radius))
+    return weight / (float(operating.density) * math.pi * radius**2 * tip**2)
+
+
+def advance_ratio(speed: float, rotor: Rotor, operating: OperatingPoint) -> float:
+    """Return μ of a horizontal speed in m/s. Raises InputError where it is negative or no rotor's."""
+    check_range("speed", speed, SPEED)
+    return speed / float(operating.tip_speed(rotor.radius))
+
+
+def _arrays(values: tuple[float, ...]) -> tuple:
+    return tuple(jnp.asarray(value, float) for value in values)
