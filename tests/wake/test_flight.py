@@ -135,10 +135,9 @@ def test_wake_age_goes_with_the_rotors_speed(still, wake):
 def test_lift_fades_where_hardly_any_air_passes_a_section(still):
     """In full at 0.1 ΩR, gone at 0.004, and the loads of a rigid rotor in hover are left as they are."""
     model = flying(still)
-    speeds = jnp.array([0.004, 0.02, 0.04, 0.1, 0.5])
+    speeds = jnp.array([0.004, 0.02, 0.04, 0.1, 0.5])  # left by a wind that goes with the blade
     air = jnp.zeros((SLICES, 5, 3)).at[..., 1].set(model.stations - speeds)
     gamma = jnp.zeros((SLICES, 5))
-    # a wind along the blade's motion that leaves these speeds over it
     faded = blade_loads(model, air, gamma, inputs_of(model)).circulation[0]
     whole = blade_loads(still, air, gamma, inputs_of(still)).circulation[0]
     share = 1 - np.exp(-((speeds / 0.04) ** 4))
