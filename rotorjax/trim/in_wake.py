@@ -137,10 +137,12 @@ class _Stages:
     def __init__(self, progress: Progress | None) -> None:
         self._progress, self.iterations = progress, 0
         self.nearest: Outcome | None = None
+        self.interrupted = False
 
     def done(self, stage: str, outcome: Outcome) -> Outcome:
         """Count and show an outcome, and hand it on."""
         self.iterations += outcome.iterations
+        self.interrupted |= outcome.interrupted
         if self._progress is not None:
             self._progress(stage, outcome.residual)
         return outcome
@@ -192,6 +194,8 @@ def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimmed
         branch = _thinner(p, found.x, THICKER, stages)
         if branch.reached:
             return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
+    if stages.interrupted:
+        return TrimmedInWake(found.x, p, replace(found, converged=False, why="interrupted"), stages.iterations)
     return _by_way_of_washout(p, controls, coning, stages)
 
 

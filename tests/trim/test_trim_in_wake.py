@@ -18,7 +18,7 @@ from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
 from rotorjax.trim.free_wake import hub_moment, residual
-from rotorjax.trim.in_wake import trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import _by_way_of_washout, _Stages, trim_in_wake, wake_trim
 from rotorjax.trim.means import evaluated, means
 from rotorjax.trim.run import check, numbers, request, run, table
 from rotorjax.trim.verdict import verdict
@@ -169,3 +169,17 @@ def test_a_trim_says_what_it_is_worth(cruise, told):
     assert "loads good to about" in str(early)
     assert far.word == "no solution"
     assert "called off" in str(far)
+
+
+@pytest.mark.slow
+def test_the_long_way_round_comes_to_the_same_trim(cruise):
+    """Thicker cores and an auxiliary flow, which slow flight needs, and back."""
+    controls, coning = jnp.asarray(cruise.means.controls[:3]), float(cruise.means.flap[0])
+    seen = []
+    stages = _Stages(lambda stage, residual: seen.append(stage))
+    found = _by_way_of_washout(cruise.trimmed.p, controls, coning, stages)
+    assert found.outcome.converged
+    assert float(found.model.washout) == 0
+    assert dict.fromkeys(seen) == dict.fromkeys(["auxiliary flow", "less auxiliary flow", "trim"])
+    np.testing.assert_allclose(found.z.controls, cruise.trimmed.z.controls, atol=1e-6)
+    np.testing.assert_allclose(found.z.wake.far, cruise.trimmed.z.wake.far, atol=1e-4)
