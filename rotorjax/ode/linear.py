@@ -125,8 +125,9 @@ class Krylov:
     Value and linear map come from one program (`jax.linearize`), which is run wherever the residual is evaluated.
     restart: Krylov vectors before a restart; a short one stagnates on wake-like spectra, so it is long. restarts: how
     often. precondition(v, x, *args): pytree map close to J⁻¹ v, or None. forcing: largest relative tolerance of the
-    linear solve, tightened as Newton converges (Eisenstat & Walker 1996, doi:10.1137/0917003, choice 2). tells: the
-    residual returns a pair, itself and something else that it knows, which is kept in the `Place`.
+    linear solve, tightened as Newton converges (Eisenstat & Walker 1996, doi:10.1137/0917003, choice 2). tightest: the
+    least that is tried where a direction leads nowhere. tells: the residual returns a pair, itself and something else
+    that it knows, which is kept in the `Place`.
     """
 
     restart: int = 400
@@ -134,6 +135,7 @@ class Krylov:
     precondition: Callable[..., PyTree] | None = None
     forcing: float = 0.1
     tells: bool = False
+    tightest: float = TIGHTEST
 
     def at(self, f: Callable, unravel: Callable, x: Array, args: PyTree) -> tuple[Array, Place]:
         """Value, and the linear map there."""
@@ -160,7 +162,7 @@ class Krylov:
 
     def retry(self, memory: Forcing, fresh: bool) -> tuple[bool, Forcing]:
         """Solve a hundred times tighter, as long as that is still tighter."""
-        return memory.rtol > TIGHTEST, replace(memory, rtol=max(memory.rtol / 100, TIGHTEST), fixed=True)
+        return memory.rtol > self.tightest, replace(memory, rtol=max(memory.rtol / 100, self.tightest), fixed=True)
 
 
 class _Flat(eqx.Module):

@@ -46,13 +46,15 @@ def newton(
     max_iterations: int = 30,
     measure: Measure = relative_rms,
     memory: Any = None,
+    smallest_step: float = SMALLEST_STEP,
     progress: bool = False,
 ) -> Outcome:
     """Find residual(x, *args) = 0 from x0 by Newton's method with backtracking on the residual's size.
 
     x0: pytree of floating-point arrays; `residual` returns the same structure. linear: `Dense(...)` (default) or
     `Krylov(...)`. measure(f, x): size of the residual, relative rms by default; `tol` is compared with it. memory: that
-    of an earlier Outcome, so that a continuation can go on with a factorised Jacobian.
+    of an earlier Outcome, so that a continuation can go on with a factorised Jacobian. smallest_step: share of a step
+    below which it leads nowhere; a continuation that can take less of its own way need not try hard.
 
     In single precision `tol` is at least 1e-5.
 
@@ -80,7 +82,7 @@ def newton(
         while not done and np.isfinite(size) and len(log.residuals) <= max_iterations:
             fresh = memory is None
             direction, memory = linear.direction(place, f, memory)
-            share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size)
+            share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size, smallest_step)
             if new_size >= size:
                 again, memory = linear.retry(memory, fresh)
                 if not again:
@@ -100,7 +102,12 @@ def newton(
 
 
 def _backtrack(
-    evaluate: Callable[[np.ndarray], tuple], measure: Measure, x: np.ndarray, direction: np.ndarray, size: float
+    evaluate: Callable[[np.ndarray], tuple],
+    measure: Measure,
+    x: np.ndarray,
+    direction: np.ndarray,
+    size: float,
+    smallest: float,
 ) -> tuple[float, np.ndarray, tuple[np.ndarray, Any], float]:
     """Halve the step until the residual falls; returns share, iterate, what `evaluate` finds and the residual's size
     of the last one tried.
@@ -110,6 +117,6 @@ def _backtrack(
         new = x + share * direction
         found = evaluate(new)
         new_size = measure(found[0], new)
-        if new_size <= (1 - 1e-4 * share) * size or share <= SMALLEST_STEP:
+        if new_size <= (1 - 1e-4 * share) * size or share <= smallest:
             return share, new, found, new_size
         share /= 2

@@ -89,7 +89,7 @@ def section_loads(
     speed = jnp.where(still, 0.0, jnp.sqrt(safe_t**2 + u_p**2))
     alpha = pitch - jnp.arctan2(u_p + chord_downwash, safe_t)
     mach = speed * operating.tip_mach(rotor.radius)
-    entry = alpha if span_mean is None else alpha @ span_mean.T
+    entry = alpha if span_mean is None else mean_angle(alpha, span_mean)
     if span_mean is None:
         cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
     else:
@@ -97,7 +97,7 @@ def section_loads(
         angles = entry * np.array([0.0, 1.0], entry.dtype).reshape(2, *(1,) * entry.ndim)
         look_up = partial(_coefficients, rotor, r, mach=mach, simple_sweep=simple_sweep)
         (cl, cd), (slope, _) = jax.jvp(look_up, (angles,), (jnp.ones_like(angles),))
-        cl, cd = cl[1] + slope[0] * (alpha - entry), cd[1]
+        cl, cd = cl[1] + slope[0] * _limited(alpha - entry), cd[1]
     half_chord = 0.5 * geometry.chord(rotor, r)
     dynamic = half_chord * (u_t**2 + u_p**2)
     return SectionLoads(
@@ -134,6 +134,27 @@ def span_averages(r: Float[Array, " R"], widths: Float[Array, " R"], length: Flo
     weight = widths * jnp.exp(-0.5 * (gap / length[:, None]) ** 2)
     total, first, second = jnp.sum(jnp.stack([weight, weight * gap, weight * gap**2]), axis=-1, keepdims=True)
     return weight * (second - first * gap) / (second * total - first**2)
+
+
+def mean_angle(alpha: Float[Array, "*n R"], average: Float[Array, "R R"]) -> Float[Array, "*n R"]:
+    """Means of angles of attack (rad) along the span, about each section's own, by the matrix of `span_averages`.
+
+    Angles repeat after a turn, so a mean of the numbers would jump where one section of a blade in reversed flow passes
+    from π to −π. Differences up to 1 rad count in full; a section whose flow comes from the other side counts for
+    nothing, for it does not stall with this one.
+    """
+    apart = alpha[..., None, :] - alpha[..., :, None]
+    apart = apart - 2 * jnp.pi * jnp.round(apart / (2 * jnp.pi))
+    t = jnp.clip((jnp.pi - jnp.abs(apart)) / (jnp.pi - 1), 0.0, 1.0)
+    return alpha + jnp.sum(average * apart * t**3 * (10 - 15 * t + 6 * t**2), axis=-1)
+
+
+def _limited(difference: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """A section's angle less the mean about it as far as lift follows it as if attached: in full to 0.2 rad, then
+    levelling off (C2) at 0.3.
+    """
+    above = jnp.maximum(jnp.abs(difference) - 0.2, 0.0)
+    return jnp.clip(difference, -0.2, 0.2) + jnp.sign(difference) * 0.1 * jnp.tanh(above / 0.1)
 
 
 def disk_loading(rotor: Rotor, loads: SectionLoads) -> Float[Array, "*n"]:

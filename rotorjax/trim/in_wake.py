@@ -1,7 +1,9 @@
 """Solving for trim in the free wake, and what it comes to.
 
 In hover the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts
-from a prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own.
+from a prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own. Where that
+is lost, in slow flight or near the ground, it starts with thicker cores far over the ground in an auxiliary flow down
+that carries the wake away, and follows the branch as the flow is taken back, the ground comes up and the cores thin.
 """
 
 from collections.abc import Callable
@@ -16,9 +18,9 @@ from rotorjax.errors import InputError
 from rotorjax.ground import Plane, pitched
 from rotorjax.inflow.momentum import hover_inflow
 from rotorjax.ode.anderson import anderson
-from rotorjax.ode.continuation import continuation
+from rotorjax.ode.continuation import Branch, continuation
 from rotorjax.ode.linear import Krylov
-from rotorjax.ode.newton import newton
+from rotorjax.ode.newton import SMALLEST_STEP, newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.flap_lag import blade_of, lag_frequency
@@ -35,8 +37,23 @@ Progress = Callable[[str, float], None]
 TOL = 1e-7
 """Relative rms of the residual of wake, blades and controls together."""
 
+COARSE = 1e-5
+"""The same on the way to the case."""
+
 THICKER = 1.6
 """Cores at the start in a wind, over the settings': with them Anderson's iteration converges from a prescribed wake."""
+
+THICKEST = 2.5
+"""The same where that fails, in slow flight and near the ground: vortices beside the disk do not roll up yet."""
+
+WASHOUT, FAR = 0.08, 4.0
+"""Auxiliary flow (over ΩR) and height (over R) that a search begins with where it is lost without."""
+
+DIRECT, WASHED = 80, 80
+"""Iterations of Anderson's from a prescribed wake; on the straight way a wake that needs more is lost."""
+
+LEAST = 0.01
+"""Least step of a continuation over the whole way."""
 
 
 @dataclass(frozen=True)
@@ -115,22 +132,27 @@ def trim_in_wake(
 
 
 class _Stages:
-    """Counts iterations and shows how far things are."""
+    """Counts iterations and shows how far things are. nearest: the best outcome at the case itself."""
 
     def __init__(self, progress: Progress | None) -> None:
         self._progress, self.iterations = progress, 0
+        self.nearest: Outcome | None = None
+        self.interrupted = False
 
     def done(self, stage: str, outcome: Outcome) -> Outcome:
         """Count and show an outcome, and hand it on."""
         self.iterations += outcome.iterations
+        self.interrupted |= outcome.interrupted
         if self._progress is not None:
             self._progress(stage, outcome.residual)
         return outcome
 
-    def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
-        """Newton-Krylov on wake, blades and controls together."""
-        linear = Krylov(forcing=0.03, restart=120, restarts=1)
-        return self.done(stage, newton(residual, z, p, linear=linear, tol=tol, max_iterations=12))
+    def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float, *, hard: bool = True) -> Outcome:
+        """Newton-Krylov on wake, blades and controls together. hard: try the least steps; else shorten the way."""
+        linear = Krylov(forcing=0.03, restart=120, restarts=1, tightest=1e-8 if hard else 1e-3)
+        least = SMALLEST_STEP if hard else 1 / 16
+        found = newton(residual, z, p, linear=linear, tol=tol, max_iterations=12, smallest_step=least)
+        return self.done(stage, found)
 
 
 def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
@@ -165,19 +187,105 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
 
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    inflow = 0.02 + 0.5 * float(hover_inflow(p.thrust, p.inputs) + p.inputs.climb)
-    guess = first_guess(p, controls, coning, p.model.settings.azimuths, inflow)
+    """Straight to the case with thick cores, and where that is lost by way of an auxiliary flow; then to its cores."""
     thick = _with_cores(replace(p, aim="flapping"), THICKER)
-    first = stages.done(
-        "prescribed wake",
-        anderson(residual, guess, thick, mixing=0.3, window=15, tol=5e-4, max_iterations=150, linear=Krylov()),
+    found = _to_thick(thick, controls, coning, stages)
+    if found.converged:
+        branch = _thinner(p, found.x, THICKER, stages)
+        if branch.reached:
+            return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
+    if stages.interrupted:
+        return TrimmedInWake(found.x, p, replace(found, converged=False, why="interrupted"), stages.iterations)
+    return _by_way_of_washout(p, controls, coning, stages)
+
+
+def _to_thick(thick: WakeTrim, controls, coning: float, stages: _Stages) -> Outcome:
+    """The trim with thick cores from a prescribed wake."""
+    guess = _prescribed(thick, controls, coning)
+    first = _anderson("prescribed wake", guess, thick, DIRECT, stages)
+    return stages.newton("thick cores", first.x, thick, COARSE) if first.converged else first
+
+
+def _by_way_of_washout(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
+    """Trim with thicker cores yet in a flow that carries the wake away, far over the ground; that flow is taken back,
+    the ground comes up, and the cores go back to the settings' own.
+    """
+    thick = _with_cores(replace(p, aim="flapping"), THICKEST)
+    first = _anderson(
+        "auxiliary flow", _prescribed(_washed(thick, 0.0), controls, coning), _washed(thick, 0.0), WASHED, stages
     )
-    outcome = stages.newton("thick cores", first.x, thick, 1e-5)
-    if outcome.converged:
-        outcome = stages.newton("trim", outcome.x, p, TOL)
-    else:
-        p = thick
-    return TrimmedInWake(outcome.x, p, outcome, stages.iterations)
+    branch = _follow("less auxiliary flow", lambda s: _washed(thick, s), first.x, 0.5, stages)
+    if branch.reached and p.model.ground is not None:
+        branch = _follow("nearer to the ground", lambda s: _lowered(thick, s), branch.last.x, 0.5, stages)
+    if not branch.reached:
+        return _lost(branch, first, p, stages)
+    branch = _thinner(p, branch.last.x, THICKEST, stages)
+    if branch.reached:
+        return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
+    return _lost(branch, first, p, stages)
+
+
+def _thinner(p: WakeTrim, x: InWake, factor: float, stages: _Stages) -> Branch:
+    """From cores `factor` times as thick to those of p, and to its aim."""
+
+    def at(s):
+        return p if s == 1 else _with_cores(p, factor ** (1 - s))
+
+    return _follow("trim", at, x, 1.0, stages)
+
+
+def _follow(stage: str, at: Callable[[float], WakeTrim], x: InWake, first: float, stages: _Stages) -> Branch:
+    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL."""
+
+    def step(guess, s, memory):
+        last = s == 1 and stage == "trim"
+        found = stages.newton(stage, guess, at(s), TOL if last else COARSE, hard=False)
+        if last and (stages.nearest is None or found.residual < stages.nearest.residual):
+            stages.nearest = found
+        return found
+
+    return continuation(step, x, 0.0, 1.0, step=first, smallest=LEAST, largest=1.0, easy=5, jump=0.5)
+
+
+def _anderson(stage: str, guess: InWake, p: WakeTrim, most: int, stages: _Stages) -> Outcome:
+    return stages.done(
+        stage,
+        anderson(residual, guess, p, mixing=0.3, window=15, tol=5e-4, max_iterations=most, linear=Krylov()),
+    )
+
+
+def _lost(branch: Branch, first: Outcome, p: WakeTrim, stages: _Stages) -> TrimmedInWake:
+    """The end of a search that did not arrive: of the last wake found and the nearest one at the case itself that which
+    is nearer to a trim of the case.
+    """
+    x = branch.last.x if branch.outcomes else first.x
+    here = newton(residual, x, p, linear=Krylov(), tol=TOL, max_iterations=0)
+    here = replace(here, converged=False, why=branch.why)
+    if stages.nearest is not None and stages.nearest.residual < here.residual:
+        here = stages.nearest
+    return TrimmedInWake(here.x, p, here, stages.iterations)
+
+
+def _prescribed(p: WakeTrim, controls, coning: float) -> InWake:
+    """A prescribed wake that goes down with momentum theory's inflow and the auxiliary flow; the collective of both."""
+    washout = float(p.model.washout)
+    inflow = washout + 0.02 + 0.5 * float(hover_inflow(p.thrust, p.inputs) + p.inputs.climb)
+    return first_guess(p, controls.at[0].add(washout / 0.75), coning, p.model.settings.azimuths, inflow)
+
+
+def _washed(p: WakeTrim, s: float) -> WakeTrim:
+    """The trim far over the ground in what is left of the auxiliary flow at s from 0 to 1."""
+    far = _lowered(p, 0.0)
+    return eqx.tree_at(lambda q: q.model.washout, far, jnp.asarray(WASHOUT * (1 - s)))
+
+
+def _lowered(p: WakeTrim, s: float) -> WakeTrim:
+    """The trim over a ground that comes up from FAR to its height, evenly in 1/h: the ground's effect goes with it."""
+    ground = p.model.ground
+    if ground is None or s == 1:
+        return p
+    height = 1 / ((1 - s) / jnp.maximum(FAR, ground.height) + s / ground.height)
+    return eqx.tree_at(lambda q: q.model.ground.height, p, height)
 
 
 def _with_cores(p: WakeTrim, factor: float) -> WakeTrim:

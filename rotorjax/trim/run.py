@@ -24,6 +24,7 @@ from rotorjax.trim.in_wake import TrimmedInWake, trim_in_wake, wake_trim
 from rotorjax.trim.means import Means, means
 from rotorjax.trim.problem import Aim, TrimResidual, inputs_at, outputs_at
 from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, trim
+from rotorjax.trim.verdict import Verdict, verdict
 from rotorjax.wake.settings import WakeSettings
 
 Progress = Callable[[str, float], None]
@@ -67,13 +68,14 @@ class Request:
 
 @dataclass(frozen=True)
 class Result:
-    """A trim and what it took. trimmed: with the states of an inflow model, or in the free wake. wall_time_s:
-    compilation included.
+    """A trim and what it took. trimmed: with the states of an inflow model, or in the free wake. verdict: what it is
+    worth. wall_time_s: compilation included.
     """
 
     request: Request
     trimmed: Trimmed | TrimmedInWake
     means: Means
+    verdict: Verdict
     wall_time_s: float
 
     @property
@@ -128,7 +130,7 @@ def run(request: Request, start: Result | None = None, progress: Progress | None
     check(request)
     near = None if start is None or not isinstance(start.trimmed, Trimmed) else start.trimmed.z
     found = _in_wake(request, progress) if request.inflow == FREE_WAKE else _in_model(request, near)
-    return Result(request, found, means(found), time.perf_counter() - begun)
+    return Result(request, found, means(found), verdict(found), time.perf_counter() - begun)
 
 
 def prepare(request: Request) -> tuple[CoupledRotor, problem.Flight, TrimResidual]:
@@ -167,8 +169,12 @@ def numbers(result: Result) -> dict[str, Any]:
         "rotor": request.rotor.name,
         "inflow": request.inflow,
         "converged": outcome.converged,
+        "verdict": result.verdict.word,
+        "verdict_text": str(result.verdict),
         "why": outcome.why,
         "residual": outcome.residual,
+        "load_change": result.verdict.load_change,
+        "node_movement": result.verdict.node_movement,
         "iterations": result.trimmed.iterations,
         "advance_ratio": request.advance,
         "height": request.height,
@@ -197,7 +203,6 @@ def figure_of_merit(thrust: float, power: float, request: Request) -> float | No
 def table(found: dict[str, Any]) -> str:
     """The same for the screen."""
     place = "out of ground effect" if found["height"] is None else f"h = {found['height']:g} R"
-    end = "converged" if found["converged"] else "NOT converged"
     rows = (
         "{rotor}, {inflow}: C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio {advance_ratio:g}, " + place,
         "controls  θ₀ {collective_deg:.3f}°, θ₁c {theta_1c_deg:.3f}°, θ₁s {theta_1s_deg:.3f}°, "
@@ -205,6 +210,6 @@ def table(found: dict[str, Any]) -> str:
         "blades    β₀ {beta_0_deg:.3f}°, β₁c {beta_1c_deg:.3f}°, β₁s {beta_1s_deg:.3f}°, lag {lag_0_deg:.3f}°",
         "power     C_P {CP:.4e}: induced {CP_induced:.4e}, profile {CP_profile:.4e}, parasite {CP_parasite:.4e}, "
         "lag dampers {CP_damper:.1e}",
-        end + " in {iterations} steps, {wall_time_s:.1f} s: {why}",
+        "in {iterations} steps, {wall_time_s:.1f} s, {verdict_text}",
     )
     return "\n".join(rows).format(**found)

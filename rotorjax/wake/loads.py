@@ -1,5 +1,6 @@
 """Loads of the blades in the air's velocity at their lifting lines."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -12,6 +13,11 @@ from rotorjax.wake.model import FreeWake
 
 REVERSAL = 0.02
 """Speed over ΩR within which the flow over a blade turns round; far below that of any station of a hovering rotor."""
+
+
+SLOW = 0.04
+"""Speed over ΩR below which a section carries no lift in flight: a polar is of steady flow, and a blade turns by a
+radian while so slow a flow passes it (reduced frequency cΩ/2u near 1). There its angle turns round within 0.01 ΩR."""
 
 
 class WakeInputs(NamedTuple):
@@ -34,7 +40,7 @@ def blade_loads(
         pitch = pitch + model.flight.cyclic[:, None]
     tangential, perpendicular = across_blades(model, control)
     downwash = gamma_bound @ own_downwash(model).T * follows(model, tangential)
-    return section_loads(
+    found = section_loads(
         model.rotor,
         model.operating,
         model.stations,
@@ -44,6 +50,13 @@ def blade_loads(
         chord_downwash=downwash,
         span_mean=span_averages(model.stations, model.widths, model.settings.stall_chords * model.chords),
     )
+    return found if model.flight is None else _without_slow_lift(found, tangential**2 + perpendicular**2)
+
+
+def _without_slow_lift(loads: SectionLoads, square: Float[Array, "K R"]) -> SectionLoads:
+    """Loads whose lift fades where the square of the speed over ΩR is below SLOW²; at 2.5 SLOW all of it is there."""
+    left = -jnp.expm1(-((square / SLOW**2) ** 2))
+    return replace(loads, cl=left * loads.cl, circulation=left * loads.circulation, dlift=left * loads.dlift)
 
 
 def own_downwash(model: FreeWake) -> Float[Array, "R R"]:

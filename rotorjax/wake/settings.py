@@ -230,9 +230,15 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
     of hover their periodic path is hardly found; the measured inflow of Elliott and Althoff is met as well with 0.08 R.
     A thin core at the control points would be singular where the flow over the blade's root turns round and carries the
     near wake back across the blade.
+
+    Stall is averaged over twice the length of hover. Retreating blades stall inboard, where panels are a third of a
+    chord, and there the steep fall of a polar outdoes what a local stall's trailers do against it: where the lift falls
+    at a_s and rises at a, a wave exp(iky) of the circulation folds if ck/8 · (a_s m − a (1 − m)) > 1, with m =
+    exp(−(k l)²/2) for a mean of length l. For the NACA 0012 (a_s = 1.9 a) that takes l above 0.66 chords; at the root,
+    which has a neighbour on one side only, half a chord does not do for the SC1095 (0.93 a) either.
     """
     azimuths = blades * -(-12 // blades)
-    usual = {"azimuths": azimuths, "closure_turns": 1, "closure_bundles": 2, "inboard": (0.45,)}
+    usual = {"azimuths": azimuths, "closure_turns": 1, "closure_bundles": 2, "inboard": (0.45,), "stall_chords": 1.0}
     usual |= {"impulse_kept": 0.0, "tip_core": 0.05, "near_core": 0.05, "control_core": 0.02}
     return wake_settings(**usual | overrides)
 

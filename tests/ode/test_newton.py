@@ -96,6 +96,15 @@ def test_line_search_holds_where_full_steps_run_away():
     assert all(b < a for a, b in zip(out.residuals[:-1], out.residuals[1:], strict=True))
 
 
+def test_a_search_that_can_take_less_of_its_way_gives_up_early():
+    """The same start, of whose first step a sixteenth would do."""
+    here = {"tol": 1e-12, "measure": lambda f, x: float(abs(f[0]))}
+    out = newton(lambda x: jnp.arctan(x), jnp.array([8.0]), smallest_step=0.5, **here)
+    assert not out.converged
+    assert out.iterations == 0
+    assert "down to 5e-01 of it" in out.why
+
+
 def test_no_root_ends_with_a_reason():
     out = newton(bratu, START, 5.0, tol=1e-9)
     assert not out.converged

@@ -216,3 +216,36 @@ def test_stalled_wing_has_one_solution_with_span_averages_and_many_without():
     starts = 0.07 + 0.03 * jax.random.normal(jax.random.PRNGKey(1), (12, 24))
     assert len(_wing_solutions(True, starts)) == 1
     assert len(_wing_solutions(False, starts)) > 1
+
+
+def _growth(chords, fall):
+    """Largest eigenvalue of ∂W/∂Γ − 1 of a wing stalled from tip to tip; at 0 its circulation folds."""
+    panels, chord = 24, 0.12
+    edges = np.linspace(-1, 1, panels + 1)
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    rise = (np.eye(panels, panels + 1) - np.eye(panels, panels + 1, 1)).T
+    wash = (1 / (4 * np.pi * (middle[:, None] - edges))) @ rise
+    average = np.asarray(
+        blade_element.span_averages(*map(jnp.asarray, (middle, np.diff(edges), 0 * middle + chords * chord)))
+    )
+    slope = 0.5 * chord * (6.2 * (np.eye(panels) - average) - fall * average)
+    return float(np.linalg.eigvals(-slope @ wash - np.eye(panels)).real.max())
+
+
+def test_a_steep_stall_needs_a_longer_average():
+    """The SC1095's lift falls at 5.7 per rad: half a chord leaves local folds, a chord (flight_settings) does not."""
+    assert _growth(0.5, 5.7) > 0.1
+    assert _growth(1.0, 5.7) < -0.2
+
+
+def test_mean_angles_take_no_notice_of_the_turn():
+    """Small differences: the plain mean. Across ±π: that of the same angles without the jump. Opposed: none."""
+    average = blade_element.span_averages(R, WIDTHS, jnp.full_like(R, 0.1))
+    small = 0.2 * jnp.sin(9 * R)
+    np.testing.assert_allclose(blade_element.mean_angle(small, average), average @ small, atol=1e-15)
+    turned = small + np.pi
+    wrapped = jnp.arctan2(jnp.sin(turned), jnp.cos(turned))
+    found = blade_element.mean_angle(wrapped, average)
+    np.testing.assert_allclose(jnp.exp(1j * found), jnp.exp(1j * (average @ turned)), atol=1e-14)
+    opposed = jnp.where(R < 0.5, np.pi, 0.0)
+    np.testing.assert_allclose(blade_element.mean_angle(opposed, average), opposed, atol=1e-12)

@@ -1,5 +1,7 @@
 """Trim in a small free wake: what it was asked for, power balance, symmetry, derivatives, the commands' numbers."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -16,9 +18,10 @@ from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
 from rotorjax.trim.free_wake import hub_moment, residual
-from rotorjax.trim.in_wake import trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import _by_way_of_washout, _Stages, trim_in_wake, wake_trim
 from rotorjax.trim.means import evaluated, means
-from rotorjax.trim.run import check, numbers, request, run
+from rotorjax.trim.run import check, numbers, request, run, table
+from rotorjax.trim.verdict import verdict
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 THRUST = 0.0058
@@ -144,3 +147,39 @@ def test_what_the_free_wake_cannot_do_is_refused():
     p = wake_trim(*load("uh60"), climbing, THRUST, plane(1.0))
     with pytest.raises(InputError, match="away from it: set climb = 0"):
         trim_in_wake(p, jnp.zeros(3), 0.0)
+
+
+@pytest.mark.slow
+def test_a_trim_says_what_it_is_worth(cruise, told):
+    """Converged: nothing moves. Called off a little early: the loads hold, and within what. Far off: no solution."""
+    assert told["verdict"] == "converged"
+    assert told["load_change"] < 1e-5
+    assert told["node_movement"] < 1e-5
+    assert "converged: loads change by" in table(told)
+
+    def judged(size):
+        z = eqx.tree_at(lambda z: z.wake.gamma_bound, cruise.trimmed.z, (1 + size) * cruise.trimmed.z.wake.gamma_bound)
+        outcome = replace(cruise.trimmed.outcome, converged=False, why="called off")
+        return verdict(replace(cruise.trimmed, z=z, outcome=outcome))
+
+    early, far = judged(1e-4), judged(0.5)
+    assert early.word == "stalled"
+    assert 1e-7 < early.load_change < 1e-2
+    assert 1e-7 < early.node_movement < 1e-3
+    assert "loads good to about" in str(early)
+    assert far.word == "no solution"
+    assert "called off" in str(far)
+
+
+@pytest.mark.slow
+def test_the_long_way_round_comes_to_the_same_trim(cruise):
+    """Thicker cores and an auxiliary flow, which slow flight needs, and back."""
+    controls, coning = jnp.asarray(cruise.means.controls[:3]), float(cruise.means.flap[0])
+    seen = []
+    stages = _Stages(lambda stage, residual: seen.append(stage))
+    found = _by_way_of_washout(cruise.trimmed.p, controls, coning, stages)
+    assert found.outcome.converged
+    assert float(found.model.washout) == 0
+    assert dict.fromkeys(seen) == dict.fromkeys(["auxiliary flow", "less auxiliary flow", "trim"])
+    np.testing.assert_allclose(found.z.controls, cruise.trimmed.z.controls, atol=1e-6)
+    np.testing.assert_allclose(found.z.wake.far, cruise.trimmed.z.wake.far, atol=1e-4)

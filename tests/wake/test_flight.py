@@ -130,3 +130,17 @@ def test_wake_age_goes_with_the_rotors_speed(still, wake):
     close(there, jax.tree.map(lambda v: 0.9 * v, here))
     blown = carried_on(state, rest._replace(far=rest.far + 0.01), wanted, slow)
     close(blown.far - there.far, jnp.full_like(state.far, 0.01))
+
+
+def test_lift_fades_where_hardly_any_air_passes_a_section(still):
+    """In full at 0.1 ΩR, gone at 0.004, and the loads of a rigid rotor in hover are left as they are."""
+    model = flying(still)
+    speeds = jnp.array([0.004, 0.02, 0.04, 0.1, 0.5])  # left by a wind that goes with the blade
+    air = jnp.zeros((SLICES, 5, 3)).at[..., 1].set(model.stations - speeds)
+    gamma = jnp.zeros((SLICES, 5))
+    faded = blade_loads(model, air, gamma, inputs_of(model)).circulation[0]
+    whole = blade_loads(still, air, gamma, inputs_of(still)).circulation[0]
+    share = 1 - np.exp(-((speeds / 0.04) ** 4))
+    np.testing.assert_allclose(faded, share * whole, rtol=1e-9, atol=1e-15)
+    assert float(faded[0] / whole[0]) < 1e-3
+    assert float(faded[3] / whole[3]) > 1 - 1e-9
