@@ -12,7 +12,7 @@ from rotorjax.bench.markdown import table
 from rotorjax.bench.plotting import INK, new_figure, series_colours, style
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation.compact import HIGHEST
-from rotorjax.linearisation.flight_output import mode_content, roots
+from rotorjax.linearisation.flight_output import mode_content
 from rotorjax.linearisation.handover import Time, handed_over, save
 from rotorjax.linearisation.hover_flight import LinearHover
 from rotorjax.linearisation.hover_small import HORIZON
@@ -27,7 +27,7 @@ def write(found: LinearHover, folder: Path, time: Time = "seconds") -> dict[str,
     request, title = found.result.request, title_of(found)
     models = {"reduced": found.small.model, "full": found.model.linear()}
     save({k: handed_over(v, request.rotor, request.operating, time) for k, v in models.items()}, folder, title)
-    plotting.save(roots({0.0: found.modes}), folder / "roots")
+    plotting.save(roots(found), folder / "roots")
     plotting.save(steps(found), folder / "steps")
     content = summary(found) | {"time": time}
     write_json(folder / "linearise.json", content)
@@ -124,7 +124,25 @@ def steps(found: LinearHover) -> Figure:
             axes.plot(times / (2 * np.pi), reduced[:, q, m], "--", color=theirs, label=f"{small.order} states")
             axes.axvline(HORIZON / (2 * np.pi), color=INK, lw=0.8, ls=":")
             axes.set(xlabel="revolutions", ylabel=f"{output} per {name}")
+        for axes in figure.axes[len(chosen) :]:
+            axes.remove()
         figure.axes[0].legend()
+    return figure
+
+
+def roots(found: LinearHover) -> Figure:
+    """Exponents of the told modes in the plane, one colour for the wake's of each kind and for each of the blades'."""
+    kinds: dict[str, list[complex]] = {}
+    for mode in found.modes:
+        kinds.setdefault(mode.name.partition(" (")[0], []).append(mode.exponent)
+    with style():
+        figure = new_figure(8.5, 5.0)
+        axes = figure.subplots()
+        axes.axvline(0, color=INK, lw=0.8)
+        for (name, values), colour in zip(kinds.items(), series_colours(len(kinds)), strict=True):
+            axes.plot(np.real(values), np.imag(values), "o", color=colour, label=name)
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=title_of(found))
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
