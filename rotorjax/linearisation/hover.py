@@ -155,7 +155,7 @@ def hover_model(
 ) -> HoverModel:
     """Linearise a hover in the free wake, all equations as they are marched.
 
-    progress(stage, share left): called after each pass. Raises InputError where the trim has not converged or changes
+    progress(stage, 0): called after each pass, with how far it is. Raises InputError where the trim has not converged or changes
     with the azimuth, a name is unknown, or there are fewer than three blades, whose cyclic motion does.
     """
     _check(base, inputs, outputs)
@@ -242,7 +242,7 @@ def _derivatives(
         chunk[: len(along[k : k + CHUNK])] = along[k : k + CHUNK]
         passes.append(np.asarray(pushed(function, z, start, base.u, base.p, jnp.asarray(chunk))))
         if progress is not None:
-            progress("linearisation", 1 - min(k + CHUNK, len(along)) / len(along))
+            progress(f"linearisation {min(k + CHUNK, len(along)) / len(along):.0%}", 0.0)
     found = np.concatenate(passes)[: len(along)]
     value, rows = _pulled(function, z, start, base.u, base.p)
     return np.asarray(value), found[: len(first), : x.size], found[len(first) :], np.asarray(rows)[:, : x.size]

@@ -73,7 +73,7 @@ def check(request: Request, wanted: Wanted) -> None:
 def linearise_hover(about: Request | Result, wanted: Wanted, progress: Progress | None = None) -> LinearHover | Result:
     """Trim where that is still to do, linearise, name the modes and reduce; a trim that did not converge is returned.
 
-    progress(stage, residual or share left) is called as things go on. Raises InputError as `check` and `trim.run.run`
+    progress(stage, residual) is called as things go on. Raises InputError as `check` and `trim.run.run`
     do.
     """
     request = about if isinstance(about, Request) else about.request
