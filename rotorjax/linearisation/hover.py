@@ -155,8 +155,8 @@ def hover_model(
 ) -> HoverModel:
     """Linearise a hover in the free wake, all equations as they are marched.
 
-    progress(stage, 0): called after each pass, with how far it is. Raises InputError where the trim has not converged or changes
-    with the azimuth, a name is unknown, or there are fewer than three blades, whose cyclic motion does.
+    progress(stage, 0): called after each pass, with how far it is. Raises InputError where the trim has not converged
+    or changes with the azimuth, a name is unknown, or there are fewer than three blades, whose cyclic motion does.
     """
     _check(base, inputs, outputs)
     x, blades = base.orbit.start, base.p.rotor.blades
