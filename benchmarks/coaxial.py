@@ -1,4 +1,4 @@
-"""A coaxial pair in the free wake: `python benchmarks/coaxial.py [--out DIR] [--quick]`.
+"""A coaxial pair in the free wake: `python benchmarks/coaxial.py [--out DIR] [--quick] [--derivative]`.
 
 The rotor that NACA TN 2318 tested (Harrington 1951): two two-bladed rotors, radius 3.81 m, chord 0.4572 m, untwisted,
 0.19 R apart, solidity 0.152 together; the section is taken as NACA 0012. Prints C_T and C_Q of pair and single rotor
@@ -11,11 +11,14 @@ import argparse
 import json
 from pathlib import Path
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import new_figure, save_file, style
+from rotorjax.wake.several_solution import performance_of
 
 jax.config.update("jax_enable_x64", True)
 
@@ -83,12 +86,36 @@ def interference(settings, thrust=0.004):
     return rows
 
 
+def derivative(settings, thrust=0.004, step=1e-5) -> None:
+    """d(ΣC_P)/dC_T of both rotors by the implicit function theorem and by differences."""
+    rotor, operating = harrington()
+    place = [(0, 0, 0), (0, 0, -SPACING)]
+
+    def pair(thrust, start=None):
+        model = rj.several_wakes(rotor, at(operating, 8), place, settings=settings, thrusts=thrust)
+        return rj.solve(model, start, tol=1e-10)
+
+    here = pair(thrust)
+
+    def power(more):
+        model = eqx.tree_at(lambda m: m.thrusts, here.found.model, here.found.model.thrusts + more)
+        return jnp.sum(performance_of(here.found, model).power)
+
+    forward, reverse = jax.jvp(jax.jit(power), (0.0,), (1.0,))[1], jax.grad(jax.jit(power))(0.0)
+    difference = (pair(thrust + step, here).CP.sum() - pair(thrust - step, here).CP.sum()) / (2 * step)
+    print(json.dumps({"forward": float(forward), "reverse": float(reverse), "difference": float(difference)}))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, help="folder for polar.png and coaxial.json")
     parser.add_argument("--quick", action="store_true", help="quick settings of the wake")
+    parser.add_argument("--derivative", action="store_true", help="check the derivative of power by thrust, alone")
     chosen = parser.parse_args()
     settings = rj.quick_settings() if chosen.quick else rj.WakeSettings()
+    if chosen.derivative:
+        derivative(settings)
+        return
     rows, near = polar(settings), interference(settings)
     if chosen.out is None:
         return

@@ -2,13 +2,16 @@
 
 import argparse
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rotorjax.commands.arguments import add_flight, add_place, add_rotor
 
 if TYPE_CHECKING:
-    from rotorjax.trim.run import Request
+    from rotorjax.linearisation.flight import Wanted
+    from rotorjax.trim.run import Progress, Request, Result
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -18,15 +21,22 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="linear state-space models of the rotor about a trim, or of its free wake",
         description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
         "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes by "
-        "name, linearise.json and report.md; several speeds or heights make a scheduled model. Without one: the free "
-        "wake of rigid blades at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
+        "name, linearise.json and report.md; several speeds or heights make a scheduled model. With --inflow freewake: "
+        "flap, lag and all states of the wake in hover, over level ground or none, seen from the hub as a "
+        "time-invariant model; wakes grow, and the reduced model says for which horizon it is. Several heights go to "
+        "folders of their own. Without a thrust: the free wake of rigid blades at a collective, in hover. Exit code 1 "
+        "where a trim or the wake did not converge.",
     )
     add = parser.add_argument
     add_rotor(parser)
     add_flight(parser, required=False)
     add_place(parser, several=True)
     add("--tilt", type=float, default=0.0, metavar="DEG", help="shaft forward (0)")
-    add("--inflow", metavar="MODEL", help="uniform, pitt-peters, vpbfsm (pitt-peters; without a thrust freewake)")
+    add(
+        "--inflow",
+        metavar="MODEL",
+        help="uniform, pitt-peters, vpbfsm, freewake (pitt-peters; without a thrust freewake)",
+    )
     add("--inputs", metavar="NAMES", help="by commas (controls and hub motion; of a wake collective)")
     add("--outputs", metavar="NAMES", help="by commas (hub loads, blades and inflow; of a wake CT,lambda0)")
     add("--order", type=int, default=20, metavar="N", help="states of the reduced model (20)")
@@ -34,58 +44,105 @@ def register(commands: argparse._SubParsersAction) -> None:
     add("--azimuths", type=int, metavar="N", help="of a revolution, at which a rotor is linearised (48)")
     add("--time", choices=("seconds", "azimuth"), default="seconds", help="seconds with SI units (default), or azimuth")
     add("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
-    add("--quick", action="store_true", help="coarser free wake of rigid blades")
+    add("--quick", action="store_true", help="coarser free wake")
     parser.set_defaults(run=run, free_wake=lambda chosen: chosen.thrust_coefficient is None and chosen.weight is None)
 
 
 def run(chosen: argparse.Namespace) -> int:
     """Solve or trim, linearise and write; the exit code."""
     trimmed = chosen.thrust_coefficient is not None or chosen.weight is not None
-    return _flights(chosen) if trimmed else _wake(chosen)
+    if not trimmed:
+        return _wake(chosen)
+    return _hovers(chosen) if chosen.inflow == "freewake" else _flights(chosen)
 
 
 def _flights(chosen: argparse.Namespace) -> int:
     """Models of a trimmed rotor, at one place or several."""
-    from tqdm import tqdm
-
-    from rotorjax.commands.arguments import introduce, names_of
+    from rotorjax.commands.arguments import introduce
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, flight_output, schedule
 
-    _refuse(chosen, {"quick": False, "collective": None}, "belongs to a free wake of rigid blades, not to a trim")
-    named = {
-        key: default if text is None else names_of(text)
-        for key, text, default in (
-            ("inputs", chosen.inputs, flight.CONTROLS),
-            ("outputs", chosen.outputs, flight.OUTPUTS),
-        )
-    }
-    azimuths = {} if chosen.azimuths is None else {"azimuths": chosen.azimuths}
-    wanted = flight.Wanted(**named, order=chosen.order, harmonics=chosen.harmonics, **azimuths)
-    requests = _requests(chosen)
+    _refuse(chosen, {"quick": False, "collective": None}, "belongs to a free wake, or to one of rigid blades")
+    wanted, requests = _wanted(chosen), _requests(chosen)
     for request in requests:
         flight.check(request, wanted)
     out = make_folder(chosen.out)
     introduce(requests[0].rotor, requests[0].operating, moves=True)
-    with tqdm(bar_format="linearise: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
-
-        def progress(stage: str, residual: float) -> None:
-            bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
-
+    with _progress_bar() as progress:
         found = schedule.flights(requests, wanted, progress)
-    lost = [one for one in found if not isinstance(one, flight.LinearFlight)]
-    for one in lost:
-        print(f"advance ratio {one.request.advance:g}: not converged: {one.trimmed.outcome.why}")
     flown = [one for one in found if isinstance(one, flight.LinearFlight)]
+    lost = [one for one in found if not isinstance(one, flight.LinearFlight)]
     if len(requests) == 1:
         for one in flown:
             flight_output.write(one, out, chosen.time)
     elif flown:
         schedule.write(flown, out, chosen.time)
-    for one in flown:
-        print(flight_output.lines(one))
-    print(f"written: {out}")
+    return _told([flight_output.lines(one) for one in flown], lost, out)
+
+
+def _hovers(chosen: argparse.Namespace) -> int:
+    """Models of a rotor in its free wake in hover, at one height or several, each in a folder of its own."""
+    from rotorjax.commands.arguments import introduce
+    from rotorjax.io.atomic import make_folder
+    from rotorjax.linearisation import hover_flight, hover_output
+
+    _refuse(chosen, {"collective": None, "azimuths": None}, "belongs to a free wake of rigid blades, or to flight")
+    wanted, requests = _wanted(chosen), _requests(chosen)
+    for request in requests:
+        hover_flight.check(request, wanted)
+    out = make_folder(chosen.out)
+    introduce(requests[0].rotor, requests[0].operating, moves=True)
+    flown, lost = [], []
+    with _progress_bar() as progress:
+        for request in requests:
+            found = hover_flight.linearise_hover(request, wanted, progress)
+            if isinstance(found, hover_flight.LinearHover):
+                hover_output.write(found, out if len(requests) == 1 else _of_height(out, request.height), chosen.time)
+                flown.append(found)
+            else:
+                lost.append(found)
+    return _told([hover_output.lines(one) for one in flown], lost, out)
+
+
+def _of_height(out: Path, height: float | None) -> Path:
+    from rotorjax.io.atomic import make_folder
+
+    return make_folder(out / ("free_air" if height is None else f"height_{height:g}"))
+
+
+def _told(lines: list[str], lost: "list[Result]", out: Path) -> int:
+    """Print what was found and what was not; the exit code."""
+    for one in lost:
+        where = "" if one.request.height is None else f", height {one.request.height:g}"
+        print(f"advance ratio {one.request.advance:g}{where}: not converged: {one.trimmed.outcome.why}")
+    print("\n".join([*lines, f"written: {out}"]))
     return 1 if lost else 0
+
+
+def _wanted(chosen: argparse.Namespace) -> "Wanted":
+    """What to linearise for."""
+    from rotorjax.commands.arguments import names_of
+    from rotorjax.linearisation.flight import CONTROLS, OUTPUTS, Wanted
+
+    inputs, outputs = (
+        default if text is None else names_of(text)
+        for text, default in ((chosen.inputs, CONTROLS), (chosen.outputs, OUTPUTS))
+    )
+    azimuths = {} if chosen.azimuths is None else {"azimuths": chosen.azimuths}
+    return Wanted(inputs, outputs, order=chosen.order, harmonics=chosen.harmonics, **azimuths)
+
+
+@contextmanager
+def _progress_bar() -> "Iterator[Progress]":
+    """A line that tells the stage, and how far it is."""
+    from tqdm import tqdm
+
+    with tqdm(bar_format="linearise: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
+
+        def progress(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
+
+        yield progress
 
 
 def _requests(chosen: argparse.Namespace) -> "list[Request]":
@@ -93,14 +150,9 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
     from dataclasses import replace
 
     from rotorjax.commands.arguments import flown
-    from rotorjax.errors import InputError
     from rotorjax.trim.run import FREE_WAKE, request
+    from rotorjax.wake.settings import quick_settings
 
-    if chosen.inflow == FREE_WAKE:
-        raise InputError(
-            "Argument `inflow` must be uniform, pitt-peters or vpbfsm with a thrust, but is 'freewake': leave the "
-            "thrust out for the free wake of rigid blades in hover"
-        )
     base = request(
         chosen.rotor,
         1e-3,
@@ -110,6 +162,8 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
         tilt_deg=chosen.tilt,
     )
     base, speeds = flown(chosen, base)
+    if chosen.quick and chosen.inflow == FREE_WAKE:
+        base = replace(base, wake=quick_settings(azimuths=2 * base.rotor.blades))
     return [replace(base, advance=mu, height=h) for h in chosen.height or [None] for mu in speeds]
 
 
@@ -124,8 +178,6 @@ def _refuse(chosen: argparse.Namespace, usual: dict, why: str) -> None:
 
 def _wake(chosen: argparse.Namespace) -> int:
     """Models of a rigid rotor's free wake in hover."""
-    from tqdm import tqdm
-
     from rotorjax.bench.settings import study_settings
     from rotorjax.bench.single import check_case
     from rotorjax.commands.arguments import case_of, introduce, names_of
@@ -143,11 +195,7 @@ def _wake(chosen: argparse.Namespace) -> int:
     check(model, inputs, outputs, chosen.order, chosen.harmonics)
     out = make_folder(chosen.out)  # before the work, not after it
     introduce(settings.rotor, settings.operating)
-    with tqdm(desc=case.label, bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
-
-        def progress(stage: str, residual: float) -> None:
-            bar.set_postfix_str(f"{stage}, residual {residual:.1e}" if residual else stage)
-
+    with _progress_bar() as progress:
         found = linearise_case(model, inputs, outputs, chosen.order, progress, harmonics=chosen.harmonics)
     if not isinstance(found, Linearised):
         write_json(out / "linearise.json", {"orbit": output.orbit(found)})

@@ -85,8 +85,8 @@ def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
     """Rotor and inputs of a flight, its controls not yet known, and the inflow's name."""
     if request.inflow == FREE_WAKE:
         raise InputError(
-            "Argument `inflow` must be uniform, pitt-peters or vpbfsm about a trim, but is 'freewake': of free wakes "
-            "that of rigid blades in hover is linearised (linearisation.run)"
+            "Argument `inflow` must be uniform, pitt-peters or vpbfsm here, but is 'freewake': its hover is linearised "
+            "by linearisation.hover_flight"
         )
     tilt = request.flight.tilt
     still = Controls(0 * tilt, 0 * tilt, 0 * tilt, tilt)

@@ -71,12 +71,13 @@ def summary(found: LinearFlight) -> dict[str, Any]:
         "reduced_gap_deg": by_name(found.small.gap_deg),
         "step_sizes": {name: steps.size_of(name) for name in model.inputs},
         "step_error": by_name(found.step_error),
-        "modes": [_mode(mode) for mode in found.modes],
+        "modes": [mode_content(mode) for mode in found.modes],
         "stages_s": found.seconds,
     }
 
 
-def _mode(mode: Mode) -> dict[str, Any]:
+def mode_content(mode: Mode) -> dict[str, Any]:
+    """A mode as linearise.json has it."""
     return {
         "name": mode.name,
         "growth": mode.exponent.real,

@@ -59,8 +59,16 @@ def readme(models: dict[str, LinearModel | PeriodicModel], title: str) -> str:
         )
         for name, unit, value in zip(names, units, values, strict=True)
     )
-    orders = {name: model.order for name, model in models.items()}
-    return README.format(title=title, time=one.time, notes=notes, signals=signals, **orders)
+    files = "\n".join(f"| `{name}` | {model.order} | {FILES[name]} |" for name, model in models.items())
+    return README.format(title=title, time=one.time, notes=notes, signals=signals, files=files)
+
+
+FILES = {
+    "reduced": "time-invariant, the blades' states kept, the inflow small",
+    "full": "time-invariant, every state that the inputs reach",
+    "periodic": "A(t) … D(t) over one revolution, their last axis in MATLAB, their first in NetCDF",
+}
+"""What each file holds."""
 
 
 README = """# {title}
@@ -70,9 +78,7 @@ Linear models about a trim: deviations obey x' = A x + B u, y = C x + D u; what 
 
 | file | states | what |
 |---|---|---|
-| `reduced` | {reduced} | time-invariant, the blades' states kept, the inflow small |
-| `full` | {full} | time-invariant, every state |
-| `periodic` | {periodic} | A(t) … D(t) over one revolution, their last axis in MATLAB, their first in NetCDF |
+{files}
 
 Each as `.mat` (A, B, C, D, x0, u0, y0, states, inputs, outputs, their units, time, notes) and as `.nc`.
 

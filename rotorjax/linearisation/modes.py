@@ -1,5 +1,6 @@
 """Modes of a linear rotor by name: coning, regressing and progressing flap and lag, inflow; who takes part in each."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,8 +37,10 @@ def modes(model: PeriodicModel) -> tuple[Mode, ...]:
     return named(exponents(model), model.states)
 
 
-def named(found: Exponents, states: tuple[str, ...]) -> tuple[Mode, ...]:
-    """Name exponents by what takes part in them: a complex pair is one mode."""
+def named(found: Exponents, states: tuple[str, ...], known: Mapping[int, str] | None = None) -> tuple[Mode, ...]:
+    """Name exponents by what takes part in them: a complex pair is one mode. known: families by number of exponent,
+    where the largest share is not to decide.
+    """
     shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
     families = [_family(state) for state in states]
     chosen = []
@@ -45,7 +48,7 @@ def named(found: Exponents, states: tuple[str, ...]) -> tuple[Mode, ...]:
         part = found.participation[:, k]
         inside = {family: np.array([one == family for one in families]) for family in dict.fromkeys(families)}
         shares = {family: float(part[members].sum()) for family, members in inside.items()}
-        family = max(shares, key=lambda name: shares[name])
+        family = (known or {}).get(k, max(shares, key=lambda name: shares[name]))
         own = np.where(inside[family], part, 0.0)
         coordinate = _coordinate(states, own) if family != "inflow" else states[int(np.argmax(own))]
         turns = abs(found.values[k].imag) > 1e-9 * (1 + abs(found.values[k]))
@@ -56,6 +59,24 @@ def named(found: Exponents, states: tuple[str, ...]) -> tuple[Mode, ...]:
         Mode(name, value, shares, {states[i]: float(part[i]) for i in np.argsort(-part) if part[i] > TELLING})
         for name, (_, _, value, shares, part) in zip(names, chosen, strict=True)
     )
+
+
+def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, str]:
+    """Which exponents are the blades', by family: as many as it has states, those in which it takes part most.
+
+    A wake of a thousand states, far from normal, takes some part in everything, and more than all blades together.
+    """
+    known: dict[int, str] = {}
+    for family in FAMILIES.values():
+        inside = np.array([_family(state) == family for state in states])
+        share, left = found.participation[inside].sum(axis=0), int(inside.sum())
+        for k in (int(k) for k in np.argsort(-share) if np.imag(found.values[k]) >= 0):
+            if left <= 0:
+                break
+            known[k] = family
+            pair = np.imag(found.values[k]) > 0 and np.isclose(found.values, found.values[k].conj(), rtol=1e-9).any()
+            left -= 2 if pair else 1
+    return known
 
 
 def _family(state: str) -> str:

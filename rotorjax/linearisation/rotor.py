@@ -29,6 +29,7 @@ from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import Orbit, make_orbit
 from rotorjax.rotor import multiblade
+from rotorjax.simulation.march import marching
 from rotorjax.simulation.start import from_wake, state_at
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.problem import inputs_at, revolution
@@ -129,7 +130,7 @@ def _base_in_wake(found: TrimmedInWake) -> Base:
     parts = [SteadyState(x.rotor, _wakes(multiblade.inverse(x.psi, blades), x.inflow, start.p)) for x in states]
     whole = jax.tree.map(lambda *leaves: jnp.stack(leaves), *parts)
     orbit = make_orbit(0.0, whole, 2 * np.pi / blades, found.outcome)
-    return Base(start.p, drive_of(start.inputs, start.p), orbit, "a free wake")
+    return Base(marching(start.p), drive_of(start.inputs, start.p), orbit, "a free wake")
 
 
 def linear_rotor(
@@ -163,7 +164,7 @@ def linear_rotor(
     names, units = state_names(start, base.p)
     found = replace(
         found, states=names, state_units=units, output_units=tuple(map(readings.unit_of, found.outputs)),
-        notes=_notes(base),
+        notes=notes(base),
     )  # fmt: skip
     return replace(found, period=2 * np.pi) if base.steady else unfolded(found, base.p.rotor.blades)
 
@@ -230,7 +231,7 @@ def _inflow_names(inflow: PyTree, p: Coupled) -> list[tuple[str, str]]:
     return [named(label) for label in labels(inflow, "wake")]
 
 
-def _notes(base: Base) -> dict[str, Any]:
+def notes(base: Base) -> dict[str, Any]:
     """What a reader needs to make numbers of it."""
     rotor, operating = base.p.rotor, base.p.operating
     return {

@@ -139,7 +139,7 @@ def balance(model: LinearModel, order: int, *, steady: bool = True) -> Reduced:
     return Reduced(_transform(whole, v2[:, :keep], w2[:keep], "balanced"), bound, singular)
 
 
-def _even(gains: Float[np.ndarray, "q m"]) -> tuple[np.ndarray, np.ndarray]:
+def even(gains: Float[np.ndarray, "q m"]) -> tuple[np.ndarray, np.ndarray]:
     """Scales of outputs (q,) and inputs (m,) that bring the largest gain of each to 1, so that units do not decide."""
     columns = gains.max(axis=0)
     columns = np.where(columns > 0, columns, 1.0)
@@ -147,7 +147,7 @@ def _even(gains: Float[np.ndarray, "q m"]) -> tuple[np.ndarray, np.ndarray]:
     return np.where(rows > 0, rows, 1.0), columns
 
 
-def _sample(highest: float, points: int, tail: float) -> list[tuple[float, float]]:
+def sample(highest: float, points: int, tail: float) -> list[tuple[float, float]]:
     """Frequencies and weights: Gauss-Legendre in the band, and in 1/ω above it with the weight of the tail."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     inside, half = (nodes + 1) / 2, weights / 2
@@ -175,14 +175,14 @@ def balance_in_band(
     if not highest > 0:
         raise InputError(f"Argument `highest` must be a positive frequency, but is {highest}")
     reach, see, gains = [], [], []
-    for omega, weight in _sample(highest, points, tail):
+    for omega, weight in sample(highest, points, tail):
         s = growth + 1j * omega
         x = model.resolvent.solve(s, model.b)
         y = model.resolvent.solve(s, model.c.T, adjoint=True)
         gains.append(np.abs(model.c @ x + model.d))
         reach += [np.real(x) * np.sqrt(weight), np.imag(x) * np.sqrt(weight)]
         see += [np.real(y) * np.sqrt(weight), np.imag(y) * np.sqrt(weight)]
-    rows, columns = _even(np.max(gains, axis=0))
+    rows, columns = even(np.max(gains, axis=0))
     right, left, singular = _balance(np.concatenate(reach / columns, axis=1), np.concatenate(see / rows, axis=1))
     keep = min(order, singular.size)
     return Reduced(_transform(model, right[:, :keep], left[:keep], "band"), None, singular)
@@ -231,7 +231,7 @@ def _sizes(model: LinearModel, highest: float) -> tuple[np.ndarray, np.ndarray, 
     points = 1j * np.geomspace(0.01, 1.0, 20) * highest
     moved = [model.resolvent.solve(s, model.b) for s in points]
     seen = [model.resolvent.solve(s, model.c.T, adjoint=True) for s in points]
-    rows, columns = _even(np.max([np.abs(model.c @ x + model.d) for x in moved], axis=0))
+    rows, columns = even(np.max([np.abs(model.c @ x + model.d) for x in moved], axis=0))
     reach = np.max([np.abs(x / columns).max(axis=1) for x in moved], axis=0)
     see = np.max([np.abs(y / rows).max(axis=1) for y in seen], axis=0)
     return reach, see, columns, rows

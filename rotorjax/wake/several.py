@@ -36,7 +36,8 @@ from rotorjax.wake.segments import Segments
 from rotorjax.wake.settings import WakeSettings
 
 COPIES = 24
-"""Least number of blades that stand for the mean over another rotor's azimuth: twice as many change C_T by 1e-5."""
+"""Least number of blades that stand for the mean over another rotor's azimuth: twice as many change the C_T of UH-60
+rotors 0.2 R apart by 0.1 %."""
 
 NEAREST = 0.02
 """Least distance of two disks on one shaft, over R."""

@@ -111,7 +111,7 @@ def solve_several(
         return found
 
     branch = continuation(
-        step, _outcome(several, alone).x, 0.0, 1.0, step=1.0, largest=1.0, smallest=0.03, easy=5, jump=0.3
+        step, _outcome(several, alone).x, 0.0, 1.0, step=0.5, largest=1.0, smallest=0.03, easy=5, jump=0.3
     )
     if not branch.outcomes:
         assert branch.failed is not None

@@ -13,7 +13,7 @@ from wakes import COARSE
 from rotorjax.coupled import RotorState
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
-from rotorjax.linearisation import flight, steps
+from rotorjax.linearisation import flight, identified, steps
 from rotorjax.linearisation.compact import compact, frequencies, reduced
 from rotorjax.linearisation.drive import drive_of
 from rotorjax.linearisation.modes import modes
@@ -23,6 +23,7 @@ from rotorjax.ode.hill import harmonic_transfer
 from rotorjax.rotor.flap_lag import flap_frequency, lag_frequency
 from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.trim.run import request, run
+from rotorjax.trim.solve import trim
 from rotorjax.wake.equilibrium import full_state, spread
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
@@ -142,7 +143,7 @@ def test_modes_have_names(periodic):
 
 
 def test_linear_steps_are_those_of_the_nonlinear_march(fast):
-    """Over a revolution, all loads but the torque's small answer to cyclic, which the polar's kinks decide."""
+    """Over a revolution, all loads but the torque's small answer to cyclic, which the lag damper's kinks decide."""
     base = base_of(fast)
     model = linear_rotor(base, INPUTS)
     truth = steps.marched(base, INPUTS, model.outputs)
@@ -152,6 +153,20 @@ def test_linear_steps_are_those_of_the_nonlinear_march(fast):
     ]
     assert error[rows].max() < 0.03
     assert np.median(error) < 0.02
+
+
+def test_torque_is_linear_too_where_the_lag_damper_is(fast):
+    """The damper's table has kinks that a step crosses; with a straight one torque is met like everything else."""
+    blade, few = fast.p.blade, ("theta_0", "theta_1c")
+    first = blade.damper_rate.size // 2 + 1
+    slope = blade.damper_force[first] / blade.damper_rate[first]
+    p = eqx.tree_at(lambda p: p.blade.damper_force, fast.p, slope * blade.damper_rate)
+    base = base_of(trim(p, fast.flight, fast.residual, fast.z))
+    model = linear_rotor(base, few)
+    error = steps.largest_gap(
+        steps.marched(base, few, model.outputs), steps.modelled(model, [steps.size_of(name) for name in few])
+    )
+    assert error[model.outputs.index("CQ")].max() < 0.03
 
 
 def test_small_models_keep_the_blades_and_the_responses(in_flight):
@@ -217,3 +232,25 @@ def test_bad_input_is_refused_before_the_trim(message):
 def test_harmonics_of_what_does_not_change_are_refused(periodic):
     with pytest.raises(InputError, match="does not change with the azimuth"):
         flight.held_harmonics(periodic, 4)
+
+
+def test_an_inflow_is_identified_from_steps(linear):
+    """Steps of a rotor whose inflow has known constants give them back, and Pitt and Peters' own are the start."""
+    own = identified.own_constants(linear)
+    true = identified.Constants(1.3 * own.m_0, 0.7 * own.k_0, 0.9 * own.m_1, 1.2 * own.k_1, -0.3 * own.k_1)
+    a, b = identified.changed(linear, own)
+    np.testing.assert_allclose(a, linear.a, atol=1e-9)
+    np.testing.assert_allclose(b, linear.b, atol=1e-9)
+    a, b = identified.changed(linear, true)
+    wake = replace(linear, a=np.asarray(a), b=np.asarray(b))
+    found = identified.identified(wake, linear, 1.0)
+    np.testing.assert_allclose(found.constants, true, rtol=1e-4)
+    assert found.error < 1e-4 < found.pitt_peters_error
+    data = identified.table([found, replace(found, height=np.inf)])
+    assert list(data.height.values) == [1.0, np.inf]
+    np.testing.assert_allclose(data.tau_0[0], true.m_0 / true.k_0, rtol=1e-3)
+    assert len(identified.text(data).splitlines()) == 5
+    between = identified.interpolated(found, replace(found, height=np.inf, constants=own), 2.0)
+    np.testing.assert_allclose(between, [(a + b) / 2 for a, b in zip(found.constants, own, strict=True)])
+    with pytest.raises(InputError, match="has no lambda_0"):
+        identified.identified(wake, replace(linear, states=tuple(f"x[{k}]" for k in range(linear.order))))

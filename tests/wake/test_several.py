@@ -11,7 +11,6 @@ import rotorjax as rj
 from rotorjax.errors import InputError
 from rotorjax.wake.equilibrium import evaluate, spread
 from rotorjax.wake.several import interference, several_wakes, velocity
-from rotorjax.wake.several_solution import performance_of, solve_several
 
 SETTINGS = rj.WakeSettings(**COARSE)
 THRUST = 0.006
@@ -78,20 +77,6 @@ def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial,
     assert ratio[0] < ratio[1]
     assert 1.2 < ratio.mean() < np.sqrt(2)
     assert coaxial.collective_deg[0] < coaxial.collective_deg[1]
-
-
-def test_derivative_of_the_pairs_power_by_its_thrust(coaxial):
-    found = coaxial.found
-
-    def power(more):
-        model = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts + more)
-        return jnp.sum(performance_of(found, model).power)
-
-    step = 1e-4
-    there = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts + step)
-    back = eqx.tree_at(lambda m: m.thrusts, found.model, found.model.thrusts - step)
-    difference = sum(s * solve_several(m, found, tol=1e-9).CP.sum() for s, m in ((1, there), (-1, back))) / (2 * step)
-    np.testing.assert_allclose(jax.jvp(jax.jit(power), (0.0,), (1.0,))[1], difference, rtol=1e-4)
 
 
 def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
