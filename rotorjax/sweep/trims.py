@@ -24,6 +24,7 @@ from rotorjax.trim.means import evaluated
 from rotorjax.trim.problem import inputs_at, node_azimuths, rates_and_outputs
 from rotorjax.trim.run import FREE_WAKE, Request, Result, numbers
 from rotorjax.trim.solve import Trimmed, guess
+from rotorjax.trim.verdict import verdict
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 READ = ("CT", "CP", "CP_induced", "CP_profile", "CP_parasite", "CP_damper", "figure_of_merit", "collective_deg")
@@ -74,15 +75,9 @@ def _solve(request: Request, near: Start | None, progress: Progress | None) -> F
     values |= dict(zip(("lambda_0", "lambda_1c", "lambda_1s"), map(float, fit), strict=True))
     values |= dimensional(told["CT"], told["CP"], request.rotor, request.operating)
     values |= {name: float(told[name]) for name in ("residual", "wall_time_s")}
-    short = max(abs(told["CT"] / request.thrust - 1), told["residual"])
-    there = not isinstance(trimmed, TrimmedInWake) or _is_the_case(trimmed, request)
+    short = max(abs(told["CT"] / request.thrust - 1), told["load_change"])
+    there = not isinstance(trimmed, TrimmedInWake) or result.verdict.word != "no solution"
     return judged(values, _state(trimmed), result.converged, there, short, told["why"])
-
-
-def _is_the_case(trimmed: TrimmedInWake, request: Request) -> bool:
-    """Whether a wake has the cores that were asked for: the search begins with thicker ones."""
-    asked = request.wake or (flight_settings(request.rotor.blades) if request.advance else None)
-    return asked is None or float(trimmed.p.model.settings.tip_core) == float(asked.tip_core)
 
 
 def _state(trimmed: Trimmed | TrimmedInWake) -> dict[str, np.ndarray]:
@@ -101,7 +96,7 @@ def _restored(near: Start) -> Result | None:
     structure = jax.tree.structure(guess(p, flight, request.azimuths))
     z = jax.tree.unflatten(structure, [jnp.asarray(state[name]) for name in sorted(state)])
     trimmed = Trimmed(z, Outcome(z, 0.0, (), 0, True, "kept", 0.0), residual, flight, p)
-    return Result(request, trimmed, trimming.means(trimmed), 0.0)
+    return Result(request, trimmed, trimming.means(trimmed), verdict(trimmed), 0.0)
 
 
 @eqx.filter_jit
