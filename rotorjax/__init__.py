@@ -35,6 +35,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "free_wake": "rotorjax.wake.model",
     "WakeSettings": "rotorjax.wake.settings",
     "flight_settings": "rotorjax.wake.settings",
+    "hover_settings": "rotorjax.wake.settings",
     "quick_settings": "rotorjax.wake.settings",
 }
 # `rotor` and `trim` are rooms too: called, they are the door's functions of that name (their __init__.py)

@@ -13,7 +13,7 @@ from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import first_harmonic
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.row import Against, Row, between, relative
-from rotorjax.wake.settings import quick_settings, wake_settings
+from rotorjax.wake.settings import hover_settings, quick_settings
 from rotorjax.wake.solution import Solution
 
 NAME = "grid"
@@ -51,7 +51,7 @@ def _with(at: Point, name: str, value: float) -> Point:
 
 def refined(quick: bool) -> dict[str, float]:
     """Twice the panels, half the age step, twice the free turns."""
-    default = (quick_settings if quick else wake_settings)()
+    default = (quick_settings if quick else hover_settings)()
     return {
         "panels": 2 * default.panels,
         "age_step_deg": default.age_step_deg / 2,
