@@ -73,7 +73,7 @@ def carried_on(state: WakeState, velocities: Velocities, wanted: Float[Array, "K
 
 def _drift(operator: AgeOperator, nodes: Float[Array, "K F A 3"], inlet: Float[Array, "K F 3"]):
     """∂ρ/∂ζ + ẑ × ρ: transport towards greater age, seen from the turning blade."""
-    turned, through = (np.stack([v.real, v.imag]) for v in (operator.turned, operator.turned_inlet))
+    turned, through = (np.stack([np.real(v), np.imag(v)]) for v in (operator.turned, operator.turned_inlet))
     x, y = (
         jnp.einsum("pij,kfj->pkfi", jnp.asarray(turned), nodes[..., i]) + through[:, None, None] * inlet[..., i, None]
         for i in (0, 1)

@@ -98,7 +98,7 @@ def points_between(model: FreeWake, nodes: Float[Array, "F A+1 3"]) -> Float[Arr
     table = settings.far_segments.table
     turned = back[:, None] * table * round_
     x, y = nodes[..., 0], nodes[..., 1]
-    turn = [turned.real, turned.imag]
+    turn = np.real(turned), np.imag(turned)
     (xc, xs), (yc, ys) = ([v @ t.T for t in turn] for v in (x, y))
     return jnp.stack([xc - ys, xs + yc, nodes[..., 2] @ table.T], axis=-1)
 
