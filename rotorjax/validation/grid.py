@@ -44,7 +44,9 @@ def pairs(subject: Subject) -> list[tuple[Point, Point]]:
     name, turns = "free_turns", refined(False)["free_turns"]
     grounds = [(None, 0.0), *((h, 0.0) for h in HEIGHTS), *((SLOPED, s) for s in SLOPES_DEG)]
     near = [Point(rotor.rotor, rotor.collective_deg, h, (), s) for h, s in grounds]
-    return found + [(at, _with(at, name, SLOPE_TURNS if at.slope_deg else turns)) for at in near]
+    found += [(at, _with(at, name, turns)) for at in near if not at.slope_deg]
+    # over a slope a wake starts from that over level ground, and that from the one in free air
+    return found + [(at, _with(at, name, SLOPE_TURNS)) for at in near if at.height in (None, SLOPED)]
 
 
 def _with(at: Point, name: str, value: float) -> Point:
