@@ -41,6 +41,7 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "several_wakes": "rotorjax.wake.several",
     "WakeSettings": "rotorjax.wake.settings",
     "flight_settings": "rotorjax.wake.settings",
+    "hover_settings": "rotorjax.wake.settings",
     "quick_settings": "rotorjax.wake.settings",
 }
 # `rotor`, `trim` and `sweep` are rooms too: called, they are the door's functions of that name (their __init__.py)

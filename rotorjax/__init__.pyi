@@ -27,6 +27,7 @@ from rotorjax.sweep.inflow_table import inflow_table as inflow_table
 from rotorjax.wake.model import free_wake as free_wake
 from rotorjax.wake.settings import WakeSettings as WakeSettings
 from rotorjax.wake.settings import flight_settings as flight_settings
+from rotorjax.wake.settings import hover_settings as hover_settings
 from rotorjax.wake.settings import quick_settings as quick_settings
 from rotorjax.wake.several import several_wakes as several_wakes
 

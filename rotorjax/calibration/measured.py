@@ -89,7 +89,7 @@ def outputs(model: FreeWake, x: Unknowns) -> Float[Array, " N"]:
     lattice = lattice_nodes(model, x.near[0])
     inside = jax.vmap(lambda row: tip_point(model, row), in_axes=1)(lattice)
     path = jnp.concatenate([inside, x.far[0, 0]])
-    ages = model.settings.age_step * jnp.arange(len(path))
+    ages = jnp.asarray(model.settings.node_ages)
     r, z = (jnp.interp(jnp.deg2rad(jnp.asarray(AGES_DEG)), ages, v) for v in (_radius(path), path[:, 2]))
     return jnp.concatenate([performance(model, found).thrust[None], lift, r, z])
 

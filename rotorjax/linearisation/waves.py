@@ -110,10 +110,10 @@ def pairing(solution: Solution) -> Pairing:
     """Pairing rate of a wake's tip vortex, from the distance in the (r, z) plane of turns 2π/B apart."""
     settings = solution.model.settings
     tip = solution.tip_vortex[0]
-    passage = settings.steps_per_turn / solution.model.rotor.blades
-    ages = np.arange(len(tip))
+    passage = 2 * np.pi / solution.model.rotor.blades
+    ages = settings.filament_ages
     radius = np.hypot(tip[:, 0], tip[:, 1])
-    whole = ages[ages + passage <= ages[-1]]
+    whole = ages[ages + passage <= ages[-1] + 1e-9]
     gaps = [np.interp(whole + passage, ages, q) - np.interp(whole, ages, q) for q in (radius, tip[:, 2])]
     spacing = np.hypot(*gaps)
     strength = np.interp(whole + 0.5 * passage, ages[1:], np.abs(np.asarray(solution.state.gamma_far[0, 0])))

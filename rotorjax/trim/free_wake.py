@@ -166,13 +166,13 @@ def _rate(angle: Float[Array, " K"]) -> Float[Array, " K"]:
 def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices: int, inflow: float) -> InWake:
     """A prescribed wake carried by the wind, blades that cone and do not lag."""
     wake = spread(prescribed(p.model, inflow), slices)
-    step = p.model.settings.age_step
+    settings = p.model.settings
+    ages, near = settings.node_ages[1:], settings.near_ages
     psi = 2 * np.pi / slices * np.arange(slices)
     wind = rotate_about_shaft(jnp.broadcast_to(-p.inputs.velocity, (slices, 3)), -jnp.asarray(psi))
 
-    def carry(nodes, first):
-        age = step * (first + jnp.arange(nodes.shape[2]))
+    def carry(nodes, age):
         return nodes + age[:, None] * wind[:, None, None, :]
 
-    moved = wake._replace(near=carry(wake.near, 1), far=carry(wake.far, p.model.settings.near_ages + 1))
+    moved = wake._replace(near=carry(wake.near, ages[:near]), far=carry(wake.far, ages[near:]))
     return InWake(moved, jnp.full(slices, float(coning)), jnp.zeros(slices), controls)

@@ -23,7 +23,7 @@ def tip_path(solution: Solution) -> Path:
     lattice = np.asarray(lattice_nodes(solution.model, state.near[0]))
     rows = [tip_point(solution.model, jnp.asarray(lattice[:, k])) for k in range(lattice.shape[1])]
     nodes = np.concatenate([np.asarray(rows), np.asarray(state.far[0, 0])])
-    return Path(settings.age_step * np.arange(len(nodes)), np.hypot(nodes[:, 0], nodes[:, 1]), nodes[:, 2])
+    return Path(settings.node_ages, np.hypot(nodes[:, 0], nodes[:, 1]), nodes[:, 2])
 
 
 def far_pitch(path: Path, blades: int) -> float:

@@ -3,6 +3,7 @@
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.field import Velocities, node_velocities
@@ -28,7 +29,9 @@ def driven(model: FreeWake, inputs: WakeInputs) -> FreeWake:
 def operators(model: FreeWake) -> tuple[AgeOperator, AgeOperator]:
     """Age differences of the near wake and of the far filaments."""
     settings = model.settings
-    return age_operator(settings.near_ages, settings.age_step), age_operator(settings.far_ages, settings.age_step)
+    grid = settings.far_grid if settings.stretch > 1 else None
+    near = age_operator(settings.near_ages, settings.age_step)
+    return near, age_operator(settings.far_ages, settings.age_step, grid)
 
 
 def leading_lines(model: FreeWake, count: int) -> Float[Array, "K R1 3"]:
@@ -70,11 +73,12 @@ def carried_on(state: WakeState, velocities: Velocities, wanted: Float[Array, "K
 
 def _drift(operator: AgeOperator, nodes: Float[Array, "K F A 3"], inlet: Float[Array, "K F 3"]):
     """∂ρ/∂ζ + ẑ × ρ: transport towards greater age, seen from the turning blade."""
-    along = (
-        jnp.einsum("ij,kfjc->kfic", jnp.asarray(operator.matrix), nodes) + operator.inlet[:, None] * inlet[:, :, None]
+    turned, through = (np.stack([np.real(v), np.imag(v)]) for v in (operator.turned, operator.turned_inlet))
+    x, y = (
+        jnp.einsum("pij,kfj->pkfi", jnp.asarray(turned), nodes[..., i]) + through[:, None, None] * inlet[..., i, None]
+        for i in (0, 1)
     )
-    turning = jnp.stack([-nodes[..., 1], nodes[..., 0], jnp.zeros_like(nodes[..., 0])], axis=-1)
-    return along + turning
+    return jnp.stack([x[0] - y[1], x[1] + y[0], _age_slope(operator, nodes[..., 2], inlet[..., 2])], axis=-1)
 
 
 def _age_slope(operator: AgeOperator, gamma: Float[Array, "K F A"], inlet: Float[Array, "K F"]):

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -17,6 +18,10 @@ STILL = 0.01
 REACH = 0.5
 """Height over R up to which a plane slows the edge of the jet that comes down on it: on the free streamline of a round
 jet of radius a, about z = a²/2r near the plane, dz/ds is 0.66 at a height of 0.5 R and 0.96 at R (a = 0.75 R)."""
+
+STEADY = 0.02
+"""Fall of ln sinh(z/REACH) in a turn below which a turn is held where it is: one that rises, in the air that comes up
+under the hub of a rotor close to the ground, must not be repeated through the disk and beyond."""
 
 HIGH = 20.0
 """Where sinh x is e^x/2 to rounding."""
@@ -52,7 +57,7 @@ def repeats(model: FreeWake) -> Repeats:
     return Repeats((*map(float, ones), *(middles - free + 0.5)), (*(1 for _ in ones), *weights))
 
 
-def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]) -> Float[Array, "F C 3"]:
+def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, ""]) -> Float[Array, "F C 3"]:
     """Nodes of the turns that follow the free ones: the last free turn, repeated under the flow in which it ends.
 
     Out of ground effect the turn moves on by its own pitch, and with the wind. Over ground it comes down at a speed
@@ -62,7 +67,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     becomes the first. A wake cut off without closure expands and bunches at its end and pulls the inflow at the disk
     with it.
     """
-    turn = model.settings.steps_per_turn
+    turn = model.settings.old_segments_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
     drift = along = jnp.zeros(3, nodes.dtype)
     if model.flight is not None:
@@ -91,7 +96,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
     x = height / REACH
     # what ln sinh x falls by in a turn is the same for every turn
     mean, mean_before = jnp.mean(x, axis=1), jnp.mean(_heights(before, normal, plane), axis=1) / REACH
-    fall = after * (_log_sinh(mean_before) - _log_sinh(mean))[:, None, None]
+    fall = after * (STEADY * jax.nn.softplus((_log_sinh(mean_before) - _log_sinh(mean)) / STEADY))[:, None, None]
     fall = jnp.minimum(fall, 2 * np.log(FARTHEST[fall.dtype.itemsize]))
     lower = _lowered(x[:, None], fall)
     wider = jnp.exp(0.5 * (fall + _log_cosh(lower) - _log_cosh(x)[:, None]))
@@ -104,7 +109,7 @@ def closure(model: FreeWake, nodes: Float[Array, "F A 3"], psi: Float[Array, ""]
 def _in_line(model: FreeWake, turns: Float[Array, "F K N 3"]) -> Float[Array, "F C 3"]:
     """Repeated turns one behind the other; a turn that goes on where the one before ends leaves out its start."""
     ones = model.settings.closure_turns
-    parts = turns[:, :ones, 1:], turns[:, ones:]
+    parts = turns[:, :ones, 1:], turns[:, ones:, :: model.settings.bundle_skip]
     return jnp.concatenate([p.reshape(len(p), -1, 3) for p in parts], axis=1)
 
 
@@ -157,26 +162,36 @@ def _heights(nodes: Float[Array, "*n 3"], normal: Float[Array, "3"], plane: Plan
 
 
 def _steps(model: FreeWake) -> tuple[Float[np.ndarray, " S"], Float[np.ndarray, " S"]]:
-    """Age of the middle of each far segment in steps, closure included, and how many segments it stands for.
+    """Age (rad) of the middle of each far segment, closure included, and how many segments it stands for.
 
-    What joins one bundle to the next is not there.
+    What joins one bundle to the next is not there. Where a bundle's chords are longer than the free part's they count
+    for more: from far away a turn is its impulse, Γ times its area, and chords enclose less.
     """
-    settings, turn = model.settings, model.settings.steps_per_turn
-    free = settings.near_ages + np.arange(settings.far_ages) + 0.5
-    ages, weights = [free], [np.ones(len(free))]
-    within = settings.near_ages + settings.far_ages + np.arange(-turn, 0) + 0.5
+    ends, turn, skip = model.settings.segment_ages, model.settings.old_segments_per_turn, model.settings.bundle_skip
+    last, larger = ends[-turn - 1 :], _chord_area(turn) / _chord_area(turn // skip)
+    ages, weights = [_middles(ends)], [np.ones(len(ends) - 1)]
     for k, w in zip(*repeats(model), strict=True):
+        within, each = (_middles(last), 1.0) if w == 1 else (_middles(last[::skip]), w * larger)
         if w > 1:
-            ages.append(within[:1] + k * turn)
+            ages.append(within[:1] + k * 2 * np.pi)
             weights.append(np.zeros(1))
-        ages.append(within + k * turn)
-        weights.append(np.full(turn, float(w)))
+        ages.append(within + k * 2 * np.pi)
+        weights.append(np.full(len(within), each))
     return np.concatenate(ages), np.concatenate(weights)
+
+
+def _middles(v: Float[np.ndarray, " N+1"]) -> Float[np.ndarray, " N"]:
+    return 0.5 * (v[1:] + v[:-1])
+
+
+def _chord_area(turn: int) -> float:
+    """Area of a polygon over that of its circle: what a turn of chords keeps of the impulse of a turn of arcs."""
+    return float(np.sinc(2 / turn))
 
 
 def segment_ages(model: FreeWake) -> Float[np.ndarray, " S"]:
     """Age (rad) at the middle of each far segment, closure included, counted from the blade."""
-    return model.settings.age_step * _steps(model)[0]
+    return _steps(model)[0]
 
 
 def turns_each(model: FreeWake) -> Float[np.ndarray, " S"]:
@@ -192,18 +207,22 @@ def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray,
     """
     settings = model.settings
     turns = (age - settings.filament_ages[0]) / (2 * np.pi)
-    left = jnp.exp(-settings.inboard_decay * turns)
+    left = jnp.exp(-settings.inboard_decay * turns - (settings.mixing * _mixed(age)) ** 2)
     arms = (np.array(settings.inboard)[:, None] / settings.release) ** 2
     tip = strength[0] + settings.impulse_kept * jnp.sum(arms * (1 - left) * strength[1:], axis=0)
     return jnp.concatenate([tip[None], left * strength[1:]])
 
 
-def cores(model: FreeWake, tip_strength: Float[Array, ""]) -> Float[Array, "F S"]:
-    """Core radii of the far segments over R (Eq. 16), growing from r₀ at the blade with the tip vortex's strength."""
+def _mixed(age: Float[np.ndarray, " S"]) -> Float[Array, " S"]:
+    """Turns for which wake of these ages (rad) has lain beside other turns."""
+    return jnp.maximum(jnp.asarray(age) / (2 * np.pi) - 1, 0)
+
+
+def cores(model: FreeWake, tip_strength: Float[Array, ""], ages: Float[np.ndarray, " S"]) -> Float[Array, "F S"]:
+    """Core radii over R of far segments of these ages (Eq. 16): r₀ at the blade, growing with the vortex's strength."""
     settings = model.settings
-    tip = core_radius(
-        jnp.asarray(segment_ages(model)), settings.tip_core, tip_strength, model.viscosity, settings.turbulence
-    )
+    tip = core_radius(jnp.asarray(ages), settings.tip_core, tip_strength, model.viscosity, settings.turbulence)
+    tip = jnp.sqrt(tip**2 + (settings.spreading * _mixed(ages)) ** 2)
     # a smooth maximum: the inboard line stands for a sheet and is never thinner than that
     inner = jnp.sqrt(tip**2 + settings.inboard_core**2)
     return jnp.stack([tip] + [inner] * (settings.filaments - 1))

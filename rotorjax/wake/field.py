@@ -20,6 +20,7 @@ from rotorjax.wake.segments import (
     join,
     lattice_segments,
     near_lattice,
+    points_between,
     releases,
 )
 
@@ -227,12 +228,14 @@ def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]
     binormal. The inboard filaments stand for a sheet and have none.
     """
     released = releases(model, slice_).points[:1]
-    tip = jnp.concatenate([released, slice_.far[0], 2 * slice_.far[0, -1:] - slice_.far[0, -2:-1]])
-    tangent = 0.5 * (tip[2:] - tip[:-2])
-    bend = tip[2:] - 2 * tip[1:-1] + tip[:-2]
+    ends = points_between(model, jnp.concatenate([released, slice_.far[0]])[None])[0]
+    tip = jnp.concatenate([ends, 2 * ends[-1:] - ends[-2:-1]])
+    own = model.settings.far_segments.own[1:]
+    tangent = 0.5 * (tip[own + 1] - tip[own - 1])
+    bend = tip[own + 1] - 2 * tip[own] + tip[own - 1]
     step = jnp.sqrt(jnp.sum(tangent**2, axis=-1, keepdims=True))
     binormal = jnp.cross(tangent, bend) / step**3
     log = jnp.log(2 * step / model.settings.self_induction_core) - 0.444
     strength = faded(model, slice_.gamma_far, model.settings.filament_ages[1:])[0]
-    own = strength[:, None] / (4 * jnp.pi) * log * binormal
-    return jnp.pad(own[None], [(0, len(slice_.far) - 1), (0, 0), (0, 0)])
+    found = strength[:, None] / (4 * jnp.pi) * log * binormal
+    return jnp.pad(found[None], [(0, len(slice_.far) - 1), (0, 0), (0, 0)])

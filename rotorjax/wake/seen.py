@@ -37,7 +37,8 @@ def seen_slice(model: FreeWake, state: WakeState, psi: Float[Array, ""], pitch: 
     start = releases(model, state)
     filaments = jnp.concatenate([start.points[:, None], state.far], axis=1)
     circulation = jnp.concatenate([start.strength[:, None], state.gamma_far], axis=1)
-    core = cores(model, start.strength[0])[:, : state.far.shape[1]]
+    ages = model.settings.filament_ages
+    core = cores(model, start.strength[0], 0.5 * (ages[1:] + ages[:-1]))
     _, forward, up = np.eye(3) if model.flight is None else model.flight.axes
     chord = geometry.chord(model.rotor, model.edges)[:, None]
     turned = (pitch + geometry.twist(model.rotor, model.edges))[:, None]

@@ -3,6 +3,7 @@
 from typing import Literal, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.far_wake import closure, cores, faded, segment_ages, turns_each
@@ -62,24 +63,44 @@ def far_filaments(
     """Far filaments of one slice at azimuth psi, with their fading and cores; part: "free" turns, "old" (the closure
     that follows them) or "all".
     """
-    free = model.settings.far_ages
     nodes = jnp.concatenate([start.points[:, None], state.far], axis=1)
-    gamma = jnp.concatenate([start.strength[:, None], state.gamma_far], axis=1)
+    gamma = ends_between(model, jnp.concatenate([start.strength[:, None], state.gamma_far], axis=1))
     strength = 0.5 * (gamma[:, 1:] + gamma[:, :-1])
-    if model.settings.closure_turns and part != "free":
-        nodes = jnp.concatenate([nodes, closure(model, nodes, psi)], axis=1)
-        more = nodes.shape[1] - 1 - strength.shape[1]
-        strength = jnp.concatenate([strength, jnp.repeat(strength[:, -1:], more, axis=1)], axis=1)
+    free = strength.shape[1]
+    nodes = points_between(model, nodes)
+    more = closure(model, nodes, psi) if model.settings.closure_turns and part != "free" else nodes[:, :0]
+    nodes = jnp.concatenate([nodes, more], axis=1)
+    if more.shape[1]:
+        strength = jnp.concatenate([strength, jnp.repeat(strength[:, -1:], more.shape[1], axis=1)], axis=1)
     chosen = slice(free if part == "old" else 0, strength.shape[1])
     ages, turns = segment_ages(model)[: chosen.stop], turns_each(model)[: chosen.stop]
     weights = faded(model, strength, ages) * turns
-    core = cores(model, start.strength[0])
+    core = cores(model, start.strength[0], ages)
     return Segments(
         nodes[:, :-1][:, chosen].reshape(-1, 3),
         nodes[:, 1:][:, chosen].reshape(-1, 3),
         weights[:, chosen].ravel(),
         core[:, chosen].ravel(),
     )
+
+
+def ends_between(model: FreeWake, values: Float[Array, "F A+1"]) -> Float[Array, "F P+1"]:
+    """Values at the ends of the far filaments' segments from those at their nodes."""
+    return values if model.settings.stretch == 1 else values @ model.settings.far_segments.table.T
+
+
+def points_between(model: FreeWake, nodes: Float[Array, "F A+1 3"]) -> Float[Array, "F P+1 3"]:
+    """Places of the ends of the far filaments' segments; what does not go round with the blade is smooth in age."""
+    settings = model.settings
+    if settings.stretch == 1:
+        return nodes
+    round_, back = (np.exp(1j * f * v) for f, v in ((1, settings.filament_ages), (-1, settings.segment_ages)))
+    table = settings.far_segments.table
+    turned = back[:, None] * table * round_
+    x, y = nodes[..., 0], nodes[..., 1]
+    turn = np.real(turned), np.imag(turned)
+    (xc, xs), (yc, ys) = ([v @ t.T for t in turn] for v in (x, y))
+    return jnp.stack([xc - ys, xs + yc, nodes[..., 2] @ table.T], axis=-1)
 
 
 def bound_vortex(model: FreeWake, gamma: Float[Array, " R"]) -> Segments:

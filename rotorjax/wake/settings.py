@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from rotorjax.checks import Range, array, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
+from rotorjax.wake.age_grid import AgeGrid, Halved, age_grid, halved, least
 
 _USUAL_AZIMUTHS = 8
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
@@ -30,6 +31,8 @@ RANGES: dict[str, Range] = {
     "self_induction_core": _POSITIVE,
     "inboard_decay": _AT_LEAST_0,
     "impulse_kept": Range(0.0, 1.0),
+    "mixing": _AT_LEAST_0,
+    "spreading": Range(0.0, 1.0),
     "stall_chords": _POSITIVE,
     "circulation_lag": _POSITIVE,
 }
@@ -48,7 +51,8 @@ class WakeSettings(eqx.Module):
         panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip.
         age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
             are free to move; closure_turns: further turns that repeat the last free one, one by one;
-            closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py).
+            closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py). stretch: how many times longer
+            the age steps of old turns are than those of young ones (age_grid.py).
         azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; None
             for eight or the next such multiple, which `for_blades` writes in.
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
@@ -90,6 +94,11 @@ class WakeSettings(eqx.Module):
             side by side in the inner sheet diffuses and cancels, the tip vortex's does not. impulse_kept: share, 0 to
             1, of the impulse that goes with it which the tip vortex makes up for (far_wake.py). 1 would keep it all;
             chosen by Caradonna and Tung's lift at half the radius, for with 1 their thrust is 7 % too large.
+        mixing, spreading: what turns that lie side by side do to each other from an age of one turn on. Their row rolls
+            up into a layer that mixes and thickens as a mixing layer does, by a steady `spreading` (R per turn) of the
+            core; the eddies grow with it, so inboard vorticity of both signs cancels at a rate that grows with age, by
+            exp(−(mixing n)²) after n such turns. Without them a vortex row of spacing b is unstable at πΓ/4b², and the
+            search is lost where turns lie on the ground.
         stall_chords: standard deviation, in chords, of the mean along the span with which the aerofoil's polar is
             entered (blade_element.span_averages); without it the root of a rotor near the ground has several stalled
             states and, between them, none.
@@ -100,6 +109,7 @@ class WakeSettings(eqx.Module):
     age_step_deg: float = eqx.field(static=True, default=15.0)
     near_wake_deg: float = eqx.field(static=True, default=90.0)
     free_turns: float = eqx.field(static=True, default=2.0)
+    stretch: int = eqx.field(static=True, default=1)
     closure_turns: int = eqx.field(static=True, default=2)
     closure_bundles: int = eqx.field(static=True, default=5)
     azimuths: int = eqx.field(static=True, default=None)  # type: ignore[assignment]  (a number from `for_blades` on)
@@ -120,6 +130,8 @@ class WakeSettings(eqx.Module):
     self_induction_core: Number = 0.0085
     inboard_decay: Number = 0.5
     impulse_kept: Number = 0.5
+    mixing: Number = 0.0
+    spreading: Number = 0.0
     stall_chords: Number = 0.5
     circulation_lag: Number = 0.1
 
@@ -149,17 +161,47 @@ class WakeSettings(eqx.Module):
     @property
     def far_ages(self) -> int:
         """Ages of the free part of the far filaments, the release point excluded."""
-        return round(self.free_turns * self.steps_per_turn)
+        return len(self.far_grid.nodes) - 1
+
+    @property
+    def far_grid(self) -> AgeGrid:
+        """Nodes of the far filaments in wake age, counted from their release."""
+        return age_grid(round(self.free_turns * self.steps_per_turn), self.steps_per_turn, self.stretch)
+
+    @property
+    def far_segments(self) -> Halved:
+        """Ends of the far filaments' segments in wake age, counted from their release."""
+        return halved(self.far_grid)
 
     @property
     def filament_ages(self) -> Float[np.ndarray, " A_F+1"]:
         """Age (rad, from the blade) of the far filaments' nodes: where they are released, then the free ones."""
-        return self.age_step * (self.near_ages + np.arange(self.far_ages + 1))
+        return self.age_step * (self.near_ages + self.far_grid.nodes)
+
+    @property
+    def segment_ages(self) -> Float[np.ndarray, " P+1"]:
+        """Age (rad, from the blade) of the ends of the far filaments' free segments: nodes and what lies between."""
+        return self.age_step * (self.near_ages + self.far_segments.nodes)
+
+    @property
+    def node_ages(self) -> Float[np.ndarray, " A_N+A_F+1"]:
+        """Age (rad) of all nodes from the blade on: lifting line, near wake, free part of the far filaments."""
+        return np.concatenate([self.age_step * np.arange(self.near_ages + 1), self.filament_ages[1:]])
 
     @property
     def steps_per_turn(self) -> int:
-        """Age steps in one turn."""
+        """Age steps in one turn of the young wake."""
         return round(360 / self.age_step_deg)
+
+    @property
+    def old_segments_per_turn(self) -> int:
+        """Segments in the last free turn and in each that repeats it one by one."""
+        return round(2 * np.pi / float(np.diff(self.segment_ages[-2:])[0]))
+
+    @property
+    def bundle_skip(self) -> int:
+        """How many segments of the last free turn a chord of a bundle stands for: as many as lie between its nodes."""
+        return 1 if self.stretch == 1 else 2
 
     @property
     def filaments(self) -> int:
@@ -175,9 +217,9 @@ _COUNTS = (("panels", 4, 200), ("closure_turns", 0, 400), ("closure_bundles", 0,
 
 def _check_counts(settings: WakeSettings) -> None:
     """Raise InputError where a number of panels, ages or turns does not work out."""
-    for name, least, most in _COUNTS:
+    for name, fewest, most in _COUNTS:
         if (value := getattr(settings, name)) is not None:
-            check_whole(name, value, least, most)
+            check_whole(name, value, fewest, most)
     step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))
@@ -193,10 +235,23 @@ def _check_counts(settings: WakeSettings) -> None:
                 f"Argument `{name}` must be a whole number of age steps ({step} deg), at least four, "
                 f"but is {ages:.3g} of them"
             )
+    _check_stretch(settings, round(steps))
     if settings.closure_turns and settings.free_turns < 2:
         raise InputError(
             f"Argument `free_turns` must be at least 2 where closure_turns > 0 (it repeats the last turn), "
             f"but is {settings.free_turns}"
+        )
+
+
+def _check_stretch(settings: WakeSettings, turn: int) -> None:
+    """Raise InputError where long steps do not divide a turn or the free part has no room for them."""
+    stretch = check_whole("stretch", settings.stretch, 1, 4)
+    if turn % stretch:
+        raise InputError(f"Argument `stretch` must divide the {turn} steps of a turn, but is {stretch}: try 2")
+    if stretch > 1 and settings.free_turns * turn < least(turn, stretch):
+        raise InputError(
+            f"Argument `free_turns` must be at least {least(turn, stretch) / turn:.3g} where stretch is {stretch} (two "
+            f"turns of long steps at the end), but is {settings.free_turns}: raise it or set stretch = 1"
         )
 
 
@@ -240,6 +295,21 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
     azimuths = blades * -(-12 // blades)
     usual = {"azimuths": azimuths, "closure_turns": 1, "closure_bundles": 2, "inboard": (0.45,), "stall_chords": 1.0}
     usual |= {"impulse_kept": 0.0, "tip_core": 0.05, "near_core": 0.05, "control_core": 0.02}
+    return wake_settings(**usual | overrides)
+
+
+MARCHED = {"free_turns": 2.0, "stretch": 1, "mixing": 0.0, "spreading": 0.0}
+"""What `wake_settings()` has where `hover_settings()` has more: the wake that is marched in time and linearised."""
+
+
+def hover_settings(**overrides) -> WakeSettings:
+    """Settings for the periodic wake in hover, over ground and slopes: four free turns, the old ones in long steps.
+
+    At h = 1 six turns change C_T and mean inflow by 0.6 %; below that no more than four were tried, and the first
+    harmonics that a slope makes, 1 % of mean inflow, are not converged (docs/free_wake.md). A march and its linear wake
+    keep the two turns of `wake_settings()`: fewer states, and no more turns than it can be trusted for.
+    """
+    usual: dict[str, Any] = {"free_turns": 4.0, "stretch": 2, "mixing": 0.4, "spreading": 0.012}
     return wake_settings(**usual | overrides)
 
 

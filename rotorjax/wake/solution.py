@@ -137,7 +137,7 @@ def rehearse(model: FreeWake) -> Solution:
 def _fits(start: Solution, model: FreeWake) -> bool:
     """Whether a solution has the blades and nodes of a model."""
     a, b = start.model, model
-    nodes = ("panels", "age_step_deg", "near_ages", "far_ages", "filaments", "roll_up")
+    nodes = ("panels", "age_step_deg", "near_ages", "far_ages", "stretch", "filaments", "roll_up")
     same = all(getattr(a.settings, n) == getattr(b.settings, n) for n in nodes)
     return same and jax.tree.structure(a.rotor) == jax.tree.structure(b.rotor)
 

@@ -12,19 +12,31 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from rotorjax.ode.age_difference import five_point_upwind
+from rotorjax.wake.age_grid import AgeGrid
 
 
 class AgeOperator(NamedTuple):
-    """5PBU4 over ages 1…A: ∂f/∂ζ ≈ matrix @ f + inlet · f₀, per rad."""
+    """5PBU4 over ages 1…A: ∂f/∂ζ ≈ matrix @ f + inlet · f₀, per rad; turned, turned_inlet: ∂u/∂ζ + iu of u = x + iy."""
 
     matrix: Float[np.ndarray, "A A"]
     inlet: Float[np.ndarray, " A"]
+    turned: Complex[np.ndarray, "A A"]
+    turned_inlet: Complex[np.ndarray, " A"]
 
 
-def age_operator(ages: int, step: float) -> AgeOperator:
-    """Differences in wake age with spacing `step` (rad), node 0 given."""
+def age_operator(ages: int, step: float, grid: AgeGrid | None = None) -> AgeOperator:
+    """Differences in wake age with spacing `step` (rad), node 0 given.
+
+    grid: ages in steps where they are not all one step apart. ∂f/∂ζ = ∂f/∂s / (dζ/ds) keeps the order, and u is
+    differenced as e^{iζ}u, which does not go round with the blade: long steps would wind a helix up.
+    """
     matrix, inlet = five_point_upwind(ages)
-    return AgeOperator(matrix / step, inlet / step)
+    if grid is None:
+        return AgeOperator(matrix / step, inlet / step, matrix / step + 1j * np.eye(ages), inlet / step + 0j)
+    steps, round_ = step * grid.spacing[1:], np.exp(1j * step * grid.nodes)
+    matrix, inlet = matrix / steps[:, None], inlet / steps
+    still = np.conj(round_[1:])
+    return AgeOperator(matrix, inlet, still[:, None] * matrix * round_[1:], still * inlet * round_[0])
 
 
 def harmonics(slices: int) -> Float[np.ndarray, " K"]:
@@ -35,31 +47,31 @@ def harmonics(slices: int) -> Float[np.ndarray, " K"]:
     return numbers
 
 
-def _solved(operator: AgeOperator, turn: int, source: Array) -> Array:
-    """Solve ∂g/∂ψ + i turn g + matrix g = source for g periodic over the slices, both (K, F, A)."""
-    inverse = _inverse(operator, source.shape[0], turn)
+def _solved(matrix: Complex[np.ndarray, "A A"] | Float[np.ndarray, "A A"], source: Array) -> Array:
+    """Solve ∂g/∂ψ + matrix g = source for g periodic over the slices, both (K, F, A)."""
+    inverse = _inverse(matrix, source.shape[0])
     if source.shape[0] == 1:  # the same at all azimuths
-        return source @ (inverse[0] if turn else inverse[0].real).T
+        return source @ (inverse[0] if np.iscomplexobj(matrix) else inverse[0].real).T
     return jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", inverse, jnp.fft.fft(source, axis=0)), axis=0)
 
 
-def _inverse(operator: AgeOperator, slices: int, turn: int) -> Complex[np.ndarray, "K A A"]:
-    unit = np.eye(len(operator.inlet))
-    return np.stack([np.linalg.inv(operator.matrix + 1j * (p + turn) * unit) for p in harmonics(slices)])
+def _inverse(matrix: np.ndarray, slices: int) -> Complex[np.ndarray, "K A A"]:
+    unit = np.eye(len(matrix))
+    return np.stack([np.linalg.inv(matrix + 1j * p * unit) for p in harmonics(slices)])
 
 
 def solve_scalar(operator: AgeOperator, f: Float[Array, "K F A"], inlet: Float[Array, "K F"]) -> Float[Array, "K F A"]:
     """Solve ∂g/∂ψ + ∂g/∂ζ = f for g periodic over the slices, with g = inlet at age 0."""
-    return _solved(operator, 0, f - operator.inlet * inlet[..., None]).real
+    return _solved(operator.matrix, f - operator.inlet * inlet[..., None]).real
 
 
 def solve_nodes(
     operator: AgeOperator, velocity: Float[Array, "K F A 3"], inlet: Float[Array, "K F 3"]
 ) -> Float[Array, "K F A 3"]:
     """Solve ∂ρ/∂ψ + ẑ × ρ + ∂ρ/∂ζ = V for node positions in the blades' frames, ρ = inlet at age 0."""
-    source = velocity - operator.inlet[:, None] * inlet[:, :, None]
-    plane = _solved(operator, 1, source[..., 0] + 1j * source[..., 1])
-    axial = _solved(operator, 0, source[..., 2])
+    across, released = velocity[..., 0] + 1j * velocity[..., 1], inlet[..., 0] + 1j * inlet[..., 1]
+    plane = _solved(operator.turned, across - operator.turned_inlet * released[..., None])
+    axial = _solved(operator.matrix, velocity[..., 2] - operator.inlet * inlet[..., 2, None])
     return jnp.stack([plane.real, plane.imag, axial.real], axis=-1)
 
 

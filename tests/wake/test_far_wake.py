@@ -31,7 +31,7 @@ def model_of(height=None, **settings):
 def helices(model):
     """Nodes of all filaments, the release point first, wound evenly down at PITCH a radian."""
     settings = model.settings
-    age = settings.age_step * np.arange(settings.near_ages, settings.near_ages + settings.far_ages + 1)
+    age = settings.filament_ages
     one = np.stack([RADIUS * np.cos(age), -RADIUS * np.sin(age), -PITCH * age], axis=-1)
     return jnp.asarray(np.stack([one] * settings.filaments))
 
@@ -65,6 +65,20 @@ def test_bundles_stand_for_all_turns_to_come(turns):
     assert float(jnp.max(whole - cut)) > 0.02 * float(whole[0])
 
 
+def test_long_steps_of_old_turns_induce_what_short_ones_do():
+    """Half as many nodes to a turn, halved between them by cubics, and a closure of their chords."""
+    short, long = (model_of(free_turns=4.0, stretch=stretch) for stretch in (1, 2))
+    assert long.settings.far_ages == 63 < short.settings.far_ages == 96
+    exact = inflow(short, DISK)
+    np.testing.assert_allclose(inflow(long, DISK), exact, atol=1e-3 * float(exact[0]))
+    # with the chords' own area the closure's jet would be 3 % too weak
+    ends = segments.points_between(long, helices(long))[0]
+    age = long.settings.segment_ages
+    np.testing.assert_allclose(
+        ends, np.stack([RADIUS * np.cos(age), -RADIUS * np.sin(age), -PITCH * age], -1), atol=1e-12
+    )
+
+
 def test_every_turn_is_counted_once():
     model = model_of(closure_turns=3, closure_bundles=4)
     after, weight = repeats(model)
@@ -93,6 +107,17 @@ def test_inboard_filaments_fade_and_the_tip_vortex_does_not():
     np.testing.assert_array_equal(left[0], released[0])
     np.testing.assert_allclose(left[1:], np.outer(released[1:], np.exp(-0.5 * turns)), rtol=1e-12)
     assert segment_ages(model)[0] == pytest.approx(np.mean(model.settings.filament_ages[:2]))
+
+
+def test_turns_that_lie_side_by_side_mix():
+    """From an age of a turn on cores thicken evenly and inboard strength falls as a Gaussian, not before."""
+    plain, mixed = (model_of(inboard_decay=0.5, mixing=m, spreading=s) for m, s in ((0.0, 0.0), (0.7, 0.03)))
+    turns = np.maximum(plain.settings.filament_ages[1:] / (2 * np.pi) - 1, 0)
+    ratio = left_of(mixed)[1][1] / left_of(plain)[1][1]
+    np.testing.assert_allclose(ratio, np.exp(-((0.7 * turns) ** 2)), rtol=1e-12)
+    ages = plain.settings.filament_ages
+    before, after = (far_wake.cores(m, jnp.asarray(0.01), ages)[0] for m in (plain, mixed))
+    np.testing.assert_allclose(after[1:] ** 2 - before[1:] ** 2, (0.03 * turns) ** 2, atol=1e-15)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0])

@@ -2,7 +2,9 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
+from rotorjax.wake.age_grid import age_grid
 from rotorjax.wake.transport import age_operator, harmonics, lag, solve_nodes, solve_scalar
 
 
@@ -28,6 +30,28 @@ def test_turning_is_fourth_order_in_the_age_step():
         errors.append(np.max(np.abs(nodes[:, 0] - np.cos(age))))
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert abs(order - 4) < 0.2
+
+
+def test_long_steps_wind_a_helix_exactly_and_keep_the_order():
+    """What goes round with the blade is no function of age to difference; what is left is of fourth order."""
+    errors, turns = [], np.array([48, 96, 192])
+    for turn in turns:
+        grid = age_grid(4 * turn, turn, 2)
+        count, age = len(grid.nodes) - 1, 2 * np.pi / turn * grid.nodes[1:]
+        assert age[-1] == pytest.approx(8 * np.pi)
+        operator = age_operator(count, 2 * np.pi / turn, grid)
+        still = solve_nodes(operator, jnp.zeros((1, 1, count, 3)), jnp.array([[[1.0, 0.0, 0.0]]]))[0, 0]
+        np.testing.assert_allclose(still[:, 0], np.cos(age), atol=1e-11)
+        grown = solve_scalar(operator, jnp.asarray(0.1 * np.exp(0.1 * age))[None, None], jnp.ones((1, 1)))[0, 0]
+        errors.append(np.max(np.abs(grown - np.exp(0.1 * age))))
+    order = -np.polyfit(np.log(turns), np.log(errors), 1)[0]
+    assert abs(order - 4) < 0.25
+
+
+def test_steps_of_one_length_are_the_operator_without_a_grid():
+    plain, on_grid = age_operator(48, 0.2), age_operator(48, 0.2, age_grid(48, 24, 1))
+    np.testing.assert_array_equal(on_grid.matrix, plain.matrix)
+    np.testing.assert_array_equal(on_grid.inlet, plain.inlet)
 
 
 def test_a_harmonic_of_bound_circulation_is_carried_back_unchanged():

@@ -1,12 +1,13 @@
 """Settings refuse what cannot be, and say what can."""
 
+import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.operating import operating_point
 from rotorjax.wake.model import free_wake
-from rotorjax.wake.settings import quick_settings, wake_settings
+from rotorjax.wake.settings import MARCHED, hover_settings, quick_settings, wake_settings
 
 
 @pytest.mark.parametrize(
@@ -18,6 +19,8 @@ from rotorjax.wake.settings import quick_settings, wake_settings
         ("age_step_deg", -15.0),
         ("near_wake_deg", 40.0),
         ("free_turns", 1.0),
+        ("stretch", 5),
+        ("spreading", -0.1),
         ("roll_up", "none"),
         ("inboard", (1.2,)),
         ("inboard", (0.5, 0.4)),
@@ -36,6 +39,22 @@ def test_bad_values_are_named(name, value):
 def test_counts_follow_from_angles():
     settings = wake_settings(age_step_deg=15.0, near_wake_deg=60.0, free_turns=3.5, inboard=(0.4,))
     assert (settings.near_ages, settings.far_ages, settings.steps_per_turn, settings.filaments) == (4, 84, 24, 2)
+
+
+def test_long_steps_need_room_and_divide_a_turn():
+    with pytest.raises(InputError, match=r"`free_turns` must be at least 2\.75 where stretch is 2"):
+        wake_settings(free_turns=2.5, stretch=2)
+    with pytest.raises(InputError, match="`stretch` must divide the 18 steps"):
+        wake_settings(free_turns=6.0, stretch=4, age_step_deg=20.0, near_wake_deg=80.0)
+    steps = np.rad2deg(np.diff(hover_settings().filament_ages))
+    assert (steps[0], steps[-24], steps[-1]) == pytest.approx((15, 30, 30))
+
+
+def test_a_march_has_what_the_wake_in_hover_adds_to():
+    plain, hover = wake_settings(), hover_settings()
+    changed = {n for n in plain.__dataclass_fields__ if getattr(plain, n) != getattr(hover, n)}
+    assert changed == set(MARCHED)
+    assert all(getattr(plain, n) == v for n, v in MARCHED.items())
 
 
 def test_quick_settings_are_coarser_and_can_be_overridden():
