@@ -2,7 +2,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import rotorjax as rj
-from rotorjax.api.solved import tip_vortices
+from rotorjax.wake.solution import tip_vortices
 
 wake = rj.solve(rj.free_wake(*rj.rotor("caradonna_tung"), None, rj.quick_settings())).found
 figure, axes = plt.subplots(subplot_kw={"projection": "3d"}, figsize=(6, 5))

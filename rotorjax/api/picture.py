@@ -1,7 +1,5 @@
 """Solved rotors as pictures."""
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
@@ -18,9 +16,7 @@ from rotorjax.bench.plotting import (
     shared_levels,
     style,
 )
-
-if TYPE_CHECKING:
-    from rotorjax.api.several import SolvedTogether
+from rotorjax.wake.several_solution import SeveralSolution
 
 COLOURS = {"free wake": FREE_WAKE, "finite state": VPBFSM}
 
@@ -48,9 +44,12 @@ def picture(data: xr.Dataset) -> Figure:
     return figure
 
 
-def together(solved: "SolvedTogether") -> Figure:
-    """Mean flow of several rotors in the upright plane through their hubs, their disks, tip vortices and ground."""
-    model = solved.found.model
+def together(solved: SeveralSolution, vortices: np.ndarray) -> Figure:
+    """Mean flow of several rotors in the upright plane through their hubs, their disks, tip vortices and ground.
+
+    vortices (N, B, A, 3): nodes in the common frame.
+    """
+    model = solved.model
     hubs, ground = np.asarray(model.places), model.wakes.ground
     floor = None if ground is None else float(hubs[0, 2] - ground.height[0])
     across_hubs = _direction(hubs)
@@ -68,7 +67,7 @@ def together(solved: "SolvedTogether") -> Figure:
         most = float(np.quantile(np.abs(flow[..., 2]), 0.995))
         filled = axes.contourf(s, z, -flow[..., 2], levels=np.linspace(-most, most, 21), cmap="RdBu_r", extend="both")
         axes.streamplot(span, height, flow @ across_hubs, flow[..., 2], color="#666666", linewidth=0.5, arrowsize=0.6)
-        for path in solved.tip_vortices().reshape(-1, *solved.tip_vortices().shape[2:]):
+        for path in vortices.reshape(-1, *vortices.shape[2:]):
             axes.plot(path @ across_hubs, path[:, 2], color=FREE_WAKE, linewidth=0.6, alpha=0.7)
         for at, up in zip(along, hubs[:, 2], strict=True):
             axes.plot([at - 1, at + 1], [up, up], color="black", linewidth=2.5, solid_capstyle="butt")

@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.api.solved import tip_vortices
 from rotorjax.wake.several import mirrored
 from rotorjax.wake.several_solution import SeveralSolution
+from rotorjax.wake.solution import tip_vortices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,7 +79,7 @@ class SolvedTogether:
         from rotorjax.api.picture import together
         from rotorjax.bench.plotting import save_file
 
-        figure = together(self)
+        figure = together(self.found, self.tip_vortices())
         if path is not None:
             save_file(figure, path)
         return figure

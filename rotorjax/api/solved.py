@@ -19,7 +19,7 @@ from rotorjax.potential import model as potential
 from rotorjax.wake import field, sensitivity
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.several import SeveralWakes
-from rotorjax.wake.solution import Solution
+from rotorjax.wake.solution import Solution, tip_vortices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,15 +214,6 @@ def performance(solved: Solved) -> Performance:
         mean_inflow=tip * solved.mean_inflow,
         figure_of_merit=hover,
     )
-
-
-def tip_vortices(found: Solution, blades: int) -> Float[np.ndarray, "B A 3"]:
-    """Tip vortices of all blades at the instant at which blade 0 stands at ψ = 0, hub frame, over R."""
-    path = np.asarray(found.tip_vortex)
-    if path.shape[0] > 1:
-        return path[:: path.shape[0] // blades]
-    turns = 2 * np.pi / blades * np.arange(blades)
-    return np.stack([np.asarray(rotate_about_shaft(jnp.asarray(path[0]), jnp.asarray(turn))) for turn in turns])
 
 
 def _about(text: str, unit: str = "1") -> dict[str, str]:

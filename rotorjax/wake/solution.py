@@ -189,6 +189,15 @@ def readings(model: FreeWake, x: Unknowns, found: Evaluation | None = None) -> S
     )
 
 
+def tip_vortices(found: Solution, blades: int) -> Float[np.ndarray, "B A 3"]:
+    """Tip vortices of all blades at the instant at which blade 0 stands at ψ = 0, hub frame, over R."""
+    path = np.asarray(found.tip_vortex)
+    if path.shape[0] > 1:
+        return path[:: path.shape[0] // blades]
+    turns = 2 * np.pi / blades * np.arange(blades)
+    return np.stack([np.asarray(rotate_about_shaft(jnp.asarray(path[0]), jnp.asarray(turn))) for turn in turns])
+
+
 @eqx.filter_jit
 def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
     """Fields of a solution: along blades and vortices, and of the whole rotor."""
