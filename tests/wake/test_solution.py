@@ -70,7 +70,8 @@ def test_nothing_flows_through_a_slope(uh60, coarse_slope, grounded):
     assert found.ground_normal_velocity_rms < 1e-10
 
 
-def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover):
+def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover, monkeypatch):
+    monkeypatch.setattr("rotorjax.wake.search.SMALLEST", 0.5)  # it would only be lost later
     rotor, operating = uh60
     upside_down = eqx.tree_at(lambda o: o.collective, operating, jnp.asarray(-0.6))
     found = solve(free_wake(rotor, upside_down, None, coarse), start=hover)
