@@ -6,8 +6,13 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
+from jaxtyping import Float
 
+from rotorjax.inflow.balance import Balance
+from rotorjax.operating import OperatingPoint
+from rotorjax.rotor.geometry import Rotor
 from rotorjax.sweep.keys import Quantity
+from rotorjax.wake.solution import Solution
 
 Progress = Callable[[str, float], None]
 CONVERGED, STALLED, NONE = "converged", "stalled", "no solution"
@@ -65,6 +70,17 @@ class Found:
 def refused(why: str) -> Found:
     """No solution, with its reason in one line."""
     return Found({}, f"{NONE} ({' '.join(why.split())})")
+
+
+def of_hover(
+    found: Balance | Solution, fit: Float[np.ndarray, "3"], climb: float, rotor: Rotor, operating: OperatingPoint
+) -> dict[str, float]:
+    """What a hover has in either model. fit: λ₀, λ₁c, λ₁s; climb: over ΩR."""
+    numbers = {name: float(getattr(found, name)) for name in ("CT", "CP", "CP_induced", "CP_profile")}
+    CT, CP = numbers["CT"], numbers["CP"]
+    numbers["figure_of_merit"] = hover_figure(CT, CP, climb)
+    inflow = dict(zip(("lambda_0", "lambda_1c", "lambda_1s"), map(float, fit), strict=True))
+    return numbers | inflow | dimensional(CT, CP, rotor, operating)
 
 
 def judged(

@@ -21,7 +21,7 @@ from rotorjax.potential.model import FiniteStateModel
 from rotorjax.rotor.geometry import Rotor, solidity, twist
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, dimensional, hover_figure, judged, refused
+from rotorjax.sweep.found import Found, Progress, Start, judged, of_hover, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 
 SIZE = 32
@@ -106,7 +106,7 @@ def _flow(model: FiniteStateModel, at: Stations) -> Flow:
 
 
 def _read(one: Hover, found: Balance, is_found: bool, collective: float) -> Found:
-    CT, CP = float(found.CT), float(found.CP)
+    CT = float(found.CT)
     climb = float(one.operating.climb_ratio(one.rotor.radius))
     try:
         if is_found:
@@ -116,13 +116,7 @@ def _read(one: Hover, found: Balance, is_found: bool, collective: float) -> Foun
     reached = one.wanted is None or abs(CT / one.wanted - 1) < 1e-9
     fit = disk_fit(*(np.asarray(v) for v in (found.r, found.widths, found.psi, found.inflow)))
     values = {
-        "CT": CT,
-        "CP": CP,
-        "CP_induced": float(found.CP_induced),
-        "CP_profile": float(found.CP_profile),
-        "figure_of_merit": hover_figure(CT, CP, climb),
-        **dict(zip(("lambda_0", "lambda_1c", "lambda_1s"), map(float, fit), strict=True)),
-        **dimensional(CT, CP, one.rotor, one.operating),
+        **of_hover(found, fit, climb, one.rotor, one.operating),
         "collective_deg": float(np.rad2deg(collective)),
     }
     why = "loads and inflow reproduce each other at no thrust" if reached else "no collective gives this thrust"

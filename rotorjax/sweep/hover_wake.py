@@ -13,7 +13,7 @@ from rotorjax.bench.single import check_case
 from rotorjax.bench.wake_file import lost_at, model_of, start_of, state_arrays, to_dataset
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, dimensional, from_best, hover_figure, judged
+from rotorjax.sweep.found import Found, Progress, Start, from_best, judged, of_hover
 from rotorjax.sweep.rotors import rotor_of, values_of
 from rotorjax.wake.solution import solve as solve_wake
 
@@ -62,16 +62,9 @@ def _solve(wanted: WakeHover, near: Start | None, progress: Progress | None, sol
     found = solver(model_of(wanted.case, wanted.settings), begin, progress)
     lost = None if found.converged else lost_at(to_dataset(wanted.case, found, wanted.settings))
     climb = wanted.settings.climb_ratio
-    CT, CP = float(found.CT), float(found.CP)
     fit = disk_fit(found.r, found.widths, found.psi, np.asarray(found.inflow) - climb)
     values = {
-        "CT": CT,
-        "CP": CP,
-        "CP_induced": float(found.CP_induced),
-        "CP_profile": float(found.CP_profile),
-        "figure_of_merit": hover_figure(CT, CP, climb),
-        **dict(zip(("lambda_0", "lambda_1c", "lambda_1s"), map(float, fit), strict=True)),
-        **dimensional(CT, CP, wanted.settings.rotor, wanted.settings.operating),
+        **of_hover(found, fit, climb, wanted.settings.rotor, wanted.settings.operating),
         "collective_deg": wanted.settings.collective_deg,
         "load_change": float(found.load_change),
         "residual": float(found.residual),

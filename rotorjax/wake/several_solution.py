@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.checks import known
 from rotorjax.errors import InputError
 from rotorjax.ode.continuation import continuation
 from rotorjax.ode.implicit import attach
@@ -90,9 +91,15 @@ def solve_several(
     start: a converged solution of as many like rotors. progress(stage, residual): called after each step. tol: relative
     rms of the residual. A search that does not get there comes back with `converged` False, why, and what it reached:
     its `coupling` says at which share of the other rotors' flow it was lost.
+
+    Raises InputError under tracing: there `performance_of` has the derivatives.
     """
-    count = len(several)
-    if start is not None and start.converged and len(start.model) == count and start.model.slices == several.slices:
+    if not known(several):
+        raise InputError(
+            "Argument `several` must be of numbers, but is traced by jax: solve first, and differentiate "
+            "wake.several_solution.performance_of"
+        )
+    if start is not None and start.converged and _fits(start.model, several):
         x, linear = _unknowns(start), _method(several, _mean(start.state))
         found = _newton(several, x, linear, tol)
         _tell(progress, "neighbour", found)
@@ -134,6 +141,12 @@ def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Performa
     x = attach(residual, x, several, method="gmres", precondition=lambda x, model: inverse)
     driven = with_collectives(several, x.collective)
     return loads_of(driven, evaluate(driven, x.wakes))
+
+
+def _fits(a: SeveralWakes, b: SeveralWakes) -> bool:
+    """Whether two models have as many rotors, blades and nodes."""
+    same = jax.tree.structure(a.wakes.settings) == jax.tree.structure(b.wakes.settings)
+    return same and (len(a), a.slices, a.wakes.rotor.blades) == (len(b), b.slices, b.wakes.rotor.blades)
 
 
 def _share(several: SeveralWakes, coupling: float) -> SeveralWakes:

@@ -106,3 +106,11 @@ BAD = {
 def test_wrong_input_is_named(message, uh60):
     with pytest.raises(InputError, match=message):
         several_wakes(*uh60, **{"places": [(0, 0, 0), (0, 0, -0.2)], "settings": SETTINGS} | BAD[message])
+
+
+def test_a_traced_pair_is_sent_to_its_derivative(uh60):
+    def thrust(height):
+        return rj.solve(several_wakes(*uh60, [(0, 0, 0), (0, 0, -0.2)], ground=rj.plane(height))).CT.sum()
+
+    with pytest.raises(InputError, match="solve first, and differentiate"):
+        jax.grad(thrust)(2.0)
