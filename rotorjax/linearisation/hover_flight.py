@@ -45,11 +45,11 @@ class LinearHover:
 def check(request: Request, wanted: Wanted) -> None:
     """Raise InputError for a flight that is no level hover, names or an order that cannot be, before any work."""
     check_request(request)
-    for name in ("advance", "tilt_deg", "slope_deg"):
-        if getattr(request, name):
+    for name, value in (("advance_ratio", request.advance), ("tilt", request.tilt_deg), ("slope", request.slope_deg)):
+        if value:
             raise InputError(
-                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is "
-                f"{getattr(request, name):g}: take pitt-peters or vpbfsm there"
+                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is {value:g}: take "
+                "pitt-peters or vpbfsm there"
             )
     blades = request.rotor.blades
     if blades < 3:

@@ -107,8 +107,8 @@ def test_modes_of_blades_and_wake_have_names(model):
 
 
 BAD = {
-    "`advance` must be 0 for a time-invariant model in the free wake": {"advance": 0.1},
-    "`slope_deg` must be 0": {"height": 1.0, "slope_deg": 3.0},
+    "`advance_ratio` must be 0 for a time-invariant model in the free wake": {"advance": 0.1},
+    "`slope` must be 0": {"height": 1.0, "slope_deg": 3.0},
 }
 
 
