@@ -1,7 +1,7 @@
 """Do periodic wakes depend on where the search for them starts?
 
 Prescribed wakes with their contraction, pitch and strength varied at random by ±20 %, each sent through the solver's
-own way (Anderson in the auxiliary flow, then Newton-Krylov as that flow is taken back and the ground rises), for the
+own way (Anderson, then Newton-Krylov, over the ground from the first), for the
 UH-60 in hover and over level ground. Two wakes are the same where their nodes lie within 1e-5 R (rms).
 
     python benchmarks/random_starts.py [--starts 20] [--cases hover 1] [--quick] [--json FILE]
@@ -18,12 +18,11 @@ import numpy as np
 from tqdm import tqdm
 
 from rotorjax.ground import plane
-from rotorjax.ode.anderson import anderson
 from rotorjax.rotor.catalogue import load
-from rotorjax.wake.equilibrium import METHOD, Unknowns, displacement, evaluated, told
+from rotorjax.wake.equilibrium import Unknowns, displacement, evaluated
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.performance import performance
-from rotorjax.wake.search import WASHOUT, Search, over_distant_ground, with_washout
+from rotorjax.wake.search import Search, level
 from rotorjax.wake.settings import quick_settings, wake_settings
 from rotorjax.wake.start import prescribed
 
@@ -32,7 +31,7 @@ TOL, SAME = 1e-9, 1e-5
 
 def varied(model: FreeWake, contraction: float, pitch: float, strength: float) -> Unknowns:
     """The solver's prescribed wake with its final radius, its descent and its circulation multiplied."""
-    x, s = prescribed(model, WASHOUT + 0.03), model.settings
+    x, s = prescribed(model), model.settings
     ages = s.age_step * np.arange(1, s.near_ages + s.far_ages + 1)
     narrowing = 1 + (contraction - 1) * (1 - np.exp(-0.3 * ages))
     scale = jnp.asarray(np.stack([narrowing, narrowing, np.full_like(ages, pitch)], axis=-1))
@@ -42,16 +41,8 @@ def varied(model: FreeWake, contraction: float, pitch: float, strength: float) -
 
 def searched(model: FreeWake, factors: np.ndarray) -> tuple[Search, FreeWake, Unknowns]:
     """The way of `solution.solve` from another prescribed wake."""
-    free = model if model.ground is None else free_wake(model.rotor, model.operating, None, model.settings)
     search = Search(TOL, None)
-    washed = with_washout(free, WASHOUT)
-    first = anderson(told, varied(free, *factors), washed, mixing=0.3, tol=1e-3, max_iterations=80, linear=METHOD)
-    search.note("prescribed wake", first)
-    here, x = search.follow(lambda s: with_washout(free, WASHOUT * (1 - s)), first.x, "washout", 0.4)
-    if search.ok and model.ground is not None:
-        here, x = search.settle(over_distant_ground(model), x)
-        if search.ok:
-            here, x = search.move(here, model, x, "to the case")
+    here, x = search.from_nothing(level(model), varied(model, *factors))
     return search, here, x
 
 

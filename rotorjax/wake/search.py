@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax.ground import Plane
 from rotorjax.ode.anderson import anderson
 from rotorjax.ode.continuation import Branch, continuation
 from rotorjax.ode.newton import newton
@@ -26,6 +25,17 @@ STEEPER, GENTLER = np.deg2rad(7.5), np.deg2rad(1.0)
 SMALLEST = 0.05
 """Least step of a continuation over the whole way; less on a long way to a steep ground (GENTLER)."""
 
+NEAR, PASSES = 2e-3, 120
+"""Residual from which Newton's method takes over from Anderson's, and passes after which it does so anyway. A pass is a
+tenth of one of Newton's iterations, and from a rough guess these wander.
+"""
+
+MOST = 10
+"""Newton iterations at one model; what takes more is found sooner by a smaller step of the continuation."""
+
+DISTANT = 2.0
+"""Height over R at which a prescribed wake is near enough to a wake over ground."""
+
 WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
 
@@ -42,16 +52,25 @@ class Search:
     residuals: list[float] = field(default_factory=list)
     inverse: HarmonicInverse | None = None
 
-    def from_nothing(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
-        """Wake of a model without ground, by way of the auxiliary flow."""
-        washed = with_washout(model, WASHOUT)
+    def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
+        """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
+        is none, and where that is lost by way of a distant ground or the auxiliary flow.
+        """
+        found = self.from_guess(model, prescribed(model) if guess is None else guess, self.tol)
+        self.note("prescribed wake", found)
+        self.ok, self.why = found.converged, found.why
+        if found.converged or found.interrupted:
+            return model, found.x
+        far = over_distant_ground(model)
+        if model.ground is None or far.ground.height == model.ground.height:
+            return self.by_way_of_washout(model)
+        here, x = self.from_nothing(far)
+        return self.move(here, model, x, "nearer to the ground") if self.ok else (here, x)
+
+    def by_way_of_washout(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
+        """Axisymmetric wake of a model by way of the auxiliary flow, which is taken back."""
         guess = prescribed(model, WASHOUT + 0.03)
-        first = anderson(told, guess, washed, mixing=0.3, tol=1e-3, max_iterations=80, linear=METHOD)
-        self.note("prescribed wake", first)
-        if not np.isfinite(first.residual):
-            self.ok, self.why = False, f"the prescribed wake diverged: {first.why}"
-            return washed, first.x
-        return self.follow(lambda s: with_washout(model, WASHOUT * (1 - s)), first.x, "washout", 0.4)
+        return self.follow(lambda s: with_washout(model, WASHOUT * (1 - s)), guess, "less auxiliary flow", 0.4)
 
     def move(self, here: FreeWake, there: FreeWake, x: Unknowns, stage: str) -> tuple[FreeWake, Unknowns]:
         """Follow the branch from one model to another of the same structure."""
@@ -84,7 +103,7 @@ class Search:
         """Continuation over s from 0 to 1 with the model at(s)."""
 
         def step(guess, s, memory):
-            found = self.newton(at(s), guess, self.tol if s == 1 else max(self.tol, 1e-5))
+            found = self.from_guess(at(s), guess, self.tol if s == 1 else max(self.tol, 1e-5))
             if found.converged and 0 < s < 1:
                 self.prepare(at(s), found.x)
             self.note(f"{stage} {s:.2f}", found)
@@ -104,10 +123,17 @@ class Search:
         self.ok, self.why = branch.reached, branch.last.why if branch.reached else f"{stage}: {branch.why}"
         return at(reached), branch.last.x
 
+    def from_guess(self, model: FreeWake, x: Unknowns, tol: float) -> Outcome:
+        """Newton-Krylov from a guess, an axisymmetric one first brought near by passes of the fixed point."""
+        if x.near.shape[0] > 1:
+            return self.newton(model, x, tol)
+        near = anderson(told, x, model, mixing=0.2, window=20, tol=NEAR, max_iterations=PASSES, linear=METHOD)
+        return self.newton(model, near.x, tol)
+
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
         linear = replace(METHOD, precondition=self.inverse, restart=effort)
-        return newton(told, x, model, linear=linear, tol=tol, max_iterations=16 if effort > 1 else 1)
+        return newton(told, x, model, linear=linear, tol=tol, max_iterations=MOST if effort > 1 else 1)
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
@@ -124,13 +150,19 @@ class Search:
             self.progress(stage, found.residual)
 
 
+def level(model: FreeWake) -> FreeWake:
+    """The model over level ground at its height, or none."""
+    if model.ground is None:
+        return on_host(model)
+    return on_host(eqx.tree_at(lambda m: m.ground.slope, model, np.zeros_like(model.ground.slope)))
+
+
 def over_distant_ground(model: FreeWake) -> FreeWake:
-    """The model over level ground so far down that the wake out of ground effect is a good guess."""
-    ground = model.ground
-    assert ground is not None
-    height = np.maximum(3.0, 1.5 * np.asarray(ground.height))
-    level = Plane(jnp.asarray(height), jnp.asarray(np.zeros_like(ground.slope)))
-    return on_host(eqx.tree_at(lambda m: m.ground, model, level))
+    """The model with its ground, if any, so far down that a prescribed wake is a good guess."""
+    if model.ground is None:
+        return on_host(model)
+    height = np.maximum(DISTANT, np.asarray(model.ground.height))
+    return on_host(eqx.tree_at(lambda m: m.ground.height, model, height))
 
 
 def with_washout(model: FreeWake, washout: float) -> FreeWake:

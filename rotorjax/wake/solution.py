@@ -22,7 +22,7 @@ from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evalua
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
-from rotorjax.wake.search import Progress, Search, over_distant_ground
+from rotorjax.wake.search import Progress, Search, level
 from rotorjax.wake.start import prescribed
 
 Number = Numbers = Any  # of numpy, or traced by jax
@@ -106,16 +106,12 @@ def solve(
     clock = Clock()
     search = Search(tol, progress)
     if start is None or not start.converged or not _fits(start, model):
-        here, x = search.from_nothing(eqx.tree_at(lambda m: m.ground, model, None, is_leaf=lambda v: v is None))
+        here, x = search.from_nothing(level(model))
     else:
         # the static choices are the model's own (azimuths may differ), the numbers the start's
         numbers = jax.tree.leaves(start.model.settings)
         settings = jax.tree.unflatten(jax.tree.structure(model.settings), numbers)
         here, x = eqx.tree_at(lambda m: m.settings, start.model, settings), start.unknowns
-        if here.ground is not None and model.ground is None:
-            here, x = search.from_nothing(model)
-    if search.ok and here.ground is None and model.ground is not None:
-        here, x = search.settle(over_distant_ground(model), x)
     if search.ok:
         slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
         if x.near.shape[0] > slices:
@@ -135,10 +131,11 @@ def rehearse(model: FreeWake) -> Solution:
 
 
 def _fits(start: Solution, model: FreeWake) -> bool:
-    """Whether a solution has the blades and nodes of a model."""
+    """Whether a solution has the blades, nodes and ground of a model."""
     a, b = start.model, model
     nodes = ("panels", "age_step_deg", "near_ages", "far_ages", "stretch", "filaments", "roll_up")
     same = all(getattr(a.settings, n) == getattr(b.settings, n) for n in nodes)
+    same = same and (a.ground is None) == (b.ground is None)
     return same and jax.tree.structure(a.rotor) == jax.tree.structure(b.rotor)
 
 
