@@ -20,18 +20,20 @@ from rotorjax.wake.start import laid_level, prescribed, with_the_ground
 Progress = Callable[[str, float], None]
 
 STEEPER, GENTLER = np.deg2rad(7.5), np.deg2rad(1.0)
-"""Most that the ground tilts in the first step of a continuation, and a step that is tried however far it goes."""
+"""Most that the ground tilts in a step of a continuation, and a step that is tried however far it goes."""
 
 SMALLEST = 0.05
 """Least step of a continuation over the whole way; less on a long way to a steep ground (GENTLER)."""
 
-NEAR, PASSES = 2e-3, 120
+NEAR, PASSES = 2e-3, 200
 """Residual from which Newton's method takes over from Anderson's, and passes after which it does so anyway. A pass is a
 tenth of one of Newton's iterations, and from a rough guess these wander.
 """
 
-MOST = 10
-"""Newton iterations at one model; what takes more is found sooner by a smaller step of the continuation."""
+MOST, MOST_SLICES = 10, 16
+"""Newton iterations at one model, of an axisymmetric wake and of all slices: what takes more is found sooner by a smaller
+step of the continuation.
+"""
 
 DISTANT = 2.0
 """Height over R at which a prescribed wake is near enough to a wake over ground."""
@@ -88,7 +90,7 @@ class Search:
 
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
         first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
-        return self.follow(between, x, stage, first, min(last, SMALLEST))
+        return self.follow(between, x, stage, first, min(last, SMALLEST), first)
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
@@ -98,7 +100,13 @@ class Search:
         return model, found.x
 
     def follow(
-        self, at: Callable[[float], FreeWake], x: Unknowns, stage: str, first: float, smallest: float = SMALLEST
+        self,
+        at: Callable[[float], FreeWake],
+        x: Unknowns,
+        stage: str,
+        first: float,
+        smallest: float = SMALLEST,
+        largest: float = 1.0,
     ):
         """Continuation over s from 0 to 1 with the model at(s)."""
 
@@ -114,7 +122,7 @@ class Search:
 
         self.prepare(at(0.0), x)
         branch: Branch = continuation(
-            step, x, 0.0, 1.0, step=first, largest=1.0, smallest=smallest, easy=5, jump=0.3, carry=carry
+            step, x, 0.0, 1.0, step=first, largest=largest, smallest=smallest, easy=5, jump=0.3, carry=carry
         )
         if not branch.outcomes:
             self.ok, self.why = False, branch.why
@@ -127,13 +135,14 @@ class Search:
         """Newton-Krylov from a guess, an axisymmetric one first brought near by passes of the fixed point."""
         if x.near.shape[0] > 1:
             return self.newton(model, x, tol)
-        near = anderson(told, x, model, mixing=0.2, window=20, tol=NEAR, max_iterations=PASSES, linear=METHOD)
+        near = anderson(told, x, model, mixing=0.1, window=20, tol=NEAR, max_iterations=PASSES, linear=METHOD)
         return self.newton(model, near.x, tol)
 
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
         linear = replace(METHOD, precondition=self.inverse, restart=effort)
-        return newton(told, x, model, linear=linear, tol=tol, max_iterations=MOST if effort > 1 else 1)
+        most = MOST if x.near.shape[0] == 1 else MOST_SLICES
+        return newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
