@@ -17,7 +17,7 @@ from rotorjax.operating import OperatingPoint
 from rotorjax.potential.model import choices, finite_state_model
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.wake.settings import WakeSettings, quick_settings, wake_settings
+from rotorjax.wake.settings import WakeSettings, hover_settings, quick_settings
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def settings_of(
         operating = eqx.tree_at(lambda o: o.collective, operating, jnp.deg2rad(jnp.asarray(collective_deg, float)))
     if climb_ratio:
         operating = eqx.tree_at(lambda o: o.climb, operating, climb_ratio * operating.tip_speed(body.radius))
-    numbers = (quick_settings if quick else wake_settings)(**wake).for_blades(body.blades)
+    numbers = (quick_settings if quick else hover_settings)(**wake).for_blades(body.blades)
     return StudySettings(body, operating, numbers, harmonics=harmonics, flapping=flapping and body.hinge is not None)
 
 

@@ -184,10 +184,11 @@ def _wake(chosen: argparse.Namespace) -> int:
     from rotorjax.io.atomic import make_folder, write_json
     from rotorjax.linearisation import output
     from rotorjax.linearisation.run import Linearised, check, linearise_case, model_of
+    from rotorjax.wake.settings import MARCHED
 
     _only_the_wake(chosen)
     case = case_of(chosen)
-    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, quick=chosen.quick)
+    settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, quick=chosen.quick, **MARCHED)
     check_case(case, settings)
     model = model_of(case, settings)
     inputs = names_of("collective" if chosen.inputs is None else chosen.inputs)

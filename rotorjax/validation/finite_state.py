@@ -145,8 +145,8 @@ def draw(
 
 
 KNOWN = (
-    "At h = 0.75 the free wake has a fountain at the hub that sources on the plane cannot make, and below h = 1 it is "
-    "not converged in free turns. On slopes its wake runs downhill, and tilts the inflow less than one that hangs "
+    "At h = 0.75 the free wake has a fountain at the hub that sources on the plane cannot make. "
+    "On slopes its wake runs downhill, and tilts the inflow less than one that hangs "
     "straight down."
 )
 CASE = ValidationCase(NAME, "The finite-state model", points, compare, KNOWN)

@@ -14,7 +14,7 @@ from rotorjax.errors import InputError
 from rotorjax.reference import published as reference
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.heaving import Heave, Heaving, instants, marched, of_finite_states, of_free_wake
-from rotorjax.validation.point import Point, point
+from rotorjax.validation.point import Point, as_marched, point
 from rotorjax.validation.row import Against, Row, absolute, relative
 from rotorjax.wake.solution import Solution
 
@@ -77,7 +77,7 @@ class March(NamedTuple):
 def points(subject: Subject) -> tuple[Point, ...]:
     """A rotor over level ground, from the highest place down."""
     (base,) = subject.hovers(point("uh60"))
-    return tuple(Point(base.rotor, base.collective_deg, h) for h in HEIGHTS)
+    return tuple(as_marched(Point(base.rotor, base.collective_deg, h), subject.quick) for h in HEIGHTS)
 
 
 def compare(subject: Subject, wakes: Wakes) -> Comparison:

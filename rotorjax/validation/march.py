@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.disturbance import Disturbed, Fastest, disturbed, fastest, thrust
-from rotorjax.validation.point import Point, point
+from rotorjax.validation.point import Point, as_marched, point
 from rotorjax.validation.row import Against, Row, absolute, between, relative
 from rotorjax.wake.solution import Solution
 
@@ -36,7 +36,7 @@ WHAT = (
 
 def points(subject: Subject) -> tuple[Point, ...]:
     """One rotor in hover."""
-    return subject.hovers(point("caradonna_tung"))
+    return tuple(as_marched(at, subject.quick) for at in subject.hovers(point("caradonna_tung")))
 
 
 def compare(subject: Subject, wakes: Wakes) -> Comparison:

@@ -1,13 +1,16 @@
 """Wakes that cases ask for: each is solved once, from the nearest one before it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rotorjax.bench.settings import StudySettings, study_settings
 from rotorjax.ground import plane
 from rotorjax.rotor import catalogue
 from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.settings import MARCHED
+
+AS_MARCHED = tuple(sorted(MARCHED.items()))
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,9 @@ class Point:
         """Name for readers."""
         place = "OGE" if self.height is None else f"h = {self.height:g}"
         place += f", {self.slope_deg:g}° of slope" if self.slope_deg else ""
-        more = "".join(f", {name} {value:g}" for name, value in self.changes)
+        marched = set(AS_MARCHED) <= set(self.changes)
+        others = [c for c in self.changes if not (marched and c in AS_MARCHED)]
+        more = (", as marched" if marched else "") + "".join(f", {name} {value:g}" for name, value in others)
         return f"{self.rotor} {self.collective_deg:g}°, {place}{more}"
 
     def settings(self, quick: bool) -> StudySettings:
@@ -48,6 +53,11 @@ def point(rotor: str, collective_deg: float | None = None, height: float | None 
     if collective_deg is None:
         collective_deg = round(study_settings(rotor).collective_deg, 9)
     return Point(rotor, collective_deg, height, tuple(sorted(changes.items())))
+
+
+def as_marched(at: Point, quick: bool) -> Point:
+    """The wake with the free part that a march and its linear wake have; the quick one has it anyway."""
+    return at if quick else replace(at, changes=tuple(sorted({**dict(at.changes), **MARCHED}.items())))
 
 
 def needed(task: Point, tasks: Sequence[Point]) -> Point | None:

@@ -10,7 +10,7 @@ from rotorjax.linearisation.marching import nonlinear_step
 from rotorjax.reference import published as reference
 from rotorjax.rotor.geometry import solidity
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
-from rotorjax.validation.point import Point, point
+from rotorjax.validation.point import Point, as_marched, point
 from rotorjax.validation.row import Against, Row, relative
 from rotorjax.wake.solution import Solution
 
@@ -34,7 +34,8 @@ FILTERED = 0.07
 def points(subject: Subject) -> tuple[Point, ...]:
     """A rotor in hover before and after the step."""
     (base,) = subject.hovers(point("uh60"))
-    return base, point(base.rotor, base.collective_deg + SIZE_DEG)
+    both = base, point(base.rotor, base.collective_deg + SIZE_DEG)
+    return tuple(as_marched(at, subject.quick) for at in both)
 
 
 def compare(subject: Subject, wakes: Wakes) -> Comparison:

@@ -24,7 +24,7 @@ from rotorjax.operating import OperatingPoint
 from rotorjax.rotor import geometry
 from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.wake.settings import WakeSettings, wake_settings
+from rotorjax.wake.settings import WakeSettings, hover_settings
 
 
 class WakeState(eqx.Module):
@@ -152,13 +152,12 @@ def free_wake(
 ) -> FreeWake:
     """Make the model of a rotor's free wake, in or out of ground effect.
 
-    settings: `WakeSettings()` where none are given; `hover_settings()` has more free turns for a hover near the ground.
-    Everything but shapes may be traced.
+    settings: `hover_settings()` where none are given. Everything but shapes may be traced.
 
     Raises InputError where the rotor climbs over ground, its solidity or tip Mach number is beyond sense, or azimuths
     is no multiple of the number of blades.
     """
-    settings = (wake_settings() if settings is None else settings).for_blades(rotor.blades)
+    settings = (hover_settings() if settings is None else settings).for_blades(rotor.blades)
     check_rotor(rotor, operating)
     if ground is not None and known(operating.climb) and float(operating.climb) != 0:
         raise InputError(

@@ -298,13 +298,16 @@ def flight_settings(blades: int, **overrides) -> WakeSettings:
     return wake_settings(**usual | overrides)
 
 
+MARCHED = {"free_turns": 2.0, "stretch": 1, "mixing": 0.0, "spreading": 0.0}
+"""What `wake_settings()` has where `hover_settings()` has more: the wake that is marched in time and linearised."""
+
+
 def hover_settings(**overrides) -> WakeSettings:
     """Settings for the periodic wake in hover, over ground and slopes: four free turns, the old ones in long steps.
 
-    Eight turns change C_T and mean inflow of the UH-60 by 0.3 % at h = 1 and 0.1 % at 0.75, where two turns are off by
-    2 %; down to h = 0.5 and to 30° of slope every case is found, in about twice the time of the default. The first
-    harmonics that a slope makes, 1 % of mean inflow, are not converged (docs/free_wake.md). For periodic wakes: a march
-    and its linear wake are for two turns.
+    Eight turns change C_T and mean inflow of the UH-60 by 0.3 % at h = 1 and 0.1 % at 0.75; the first harmonics that a
+    slope makes, 1 % of mean inflow, are not converged (docs/free_wake.md). A march and its linear
+    wake keep the two turns of `wake_settings()`: fewer states, and no more turns than it can be trusted for.
     """
     usual: dict[str, Any] = {"free_turns": 4.0, "stretch": 2, "mixing": 0.4, "spreading": 0.012}
     return wake_settings(**usual | overrides)

@@ -7,7 +7,7 @@ from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.operating import operating_point
 from rotorjax.wake.model import free_wake
-from rotorjax.wake.settings import hover_settings, quick_settings, wake_settings
+from rotorjax.wake.settings import MARCHED, hover_settings, quick_settings, wake_settings
 
 
 @pytest.mark.parametrize(
@@ -48,6 +48,13 @@ def test_long_steps_need_room_and_divide_a_turn():
         wake_settings(free_turns=6.0, stretch=4, age_step_deg=20.0, near_wake_deg=80.0)
     steps = np.rad2deg(np.diff(hover_settings().filament_ages))
     assert (steps[0], steps[-24], steps[-1]) == pytest.approx((15, 30, 30))
+
+
+def test_a_march_has_what_the_wake_in_hover_adds_to():
+    plain, hover = wake_settings(), hover_settings()
+    changed = {n for n in plain.__dataclass_fields__ if getattr(plain, n) != getattr(hover, n)}
+    assert changed == set(MARCHED)
+    assert all(getattr(plain, n) == v for n, v in MARCHED.items())
 
 
 def test_quick_settings_are_coarser_and_can_be_overridden():
