@@ -1,22 +1,30 @@
 """Does it converge anywhere? Random flight trims and hovers in the free wake, at the settings that users get.
 
     python benchmarks/anywhere.py --n 200 --seed 1 [--parts known flights hovers] [--only 3 17] [--quick] [--json FILE]
+                                  [--jobs N] [--until SECONDS]
 
 Flights: the UH-60 and Elliott and Althoff's rotor, advance ratio 0 … 0.35, height ∞ or 0.6 … 2 R, C_T/σ 0.05 … 0.10,
 shaft −2° … 6° forward. Hovers, with rigid blades: every rotor of the catalogue, height 0.4 … 3 R, slope to 40° or to a
 clearance of 0.05 R, collective for 3 % … 120 % of the design thrust C_T/σ = 0.08. Known: flights that once stalled.
-Case i of a seed is the same whatever n is. Prints the share that converged, median and 95 % of the seconds after
-compilation (tracing counts as solving), and each failure: where it ended, with what residual, and how good its loads
-are all the same.
+Case i of a seed is the same whatever n is. --jobs shares the cases among processes with cores of their own, which give
+each other compiled programs where JAX_COMPILATION_CACHE_DIR is set; the file is written anew after every case, and a
+run that is ended (SIGTERM, Ctrl-C) sums up what it has. Prints the share that converged, median and 95 % of the seconds
+after compilation (tracing counts as solving), and each failure: where it ended, with what residual, and how good its
+loads are all the same.
 """
 
 import argparse
 import json
 import os
+import signal
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
+
+os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's own hints are no errors
 
 import jax
 import numpy as np
@@ -25,6 +33,7 @@ from tqdm import tqdm
 from rotorjax.ground import plane
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import solidity, twist
+from rotorjax.sweep.pools import Here, Job, Pool, Processes, as_seen_by_workers
 from rotorjax.trim.run import numbers, request, run
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.model import free_wake
@@ -104,22 +113,71 @@ PARTS: dict[str, tuple[Callable, Callable]] = {
 }
 
 
-def run_part(part: str, chosen: argparse.Namespace, rows: list[dict[str, Any]]) -> None:
-    """All cases of a part, each kept as soon as it is known."""
+class Pinned(Processes):
+    """Processes that each have cores to themselves: XLA makes as many threads as it sees cores."""
+
+    def __init__(self, size: int) -> None:
+        """Start them."""
+        cores = sorted(os.sched_getaffinity(0))
+        share = max(1, len(cores) // size)
+        self._shares = [set(cores[i : i + share]) for i in range(0, share * (len(cores) // share), share)]
+        super().__init__(size, print)
+
+    def _started(self) -> Any:
+        """One more, on the next cores; it inherits them."""
+        mine = os.sched_getaffinity(0)
+        self._shares.append(self._shares.pop(0))
+        os.sched_setaffinity(0, self._shares[-1])
+        try:
+            return super()._started()
+        finally:
+            os.sched_setaffinity(0, mine)
+
+
+def cases_of(chosen: argparse.Namespace) -> list[tuple[str, int]]:
+    """Parts and numbers of the cases, the first of each part first, so that a run that is ended has some of each."""
+    most = {part: len(KNOWN) if part == "known" else chosen.n for part in chosen.parts}
+    wanted = range(max(most.values())) if chosen.only is None else chosen.only
+    return [(part, i) for i in wanted for part in chosen.parts if i < most[part]]
+
+
+def row_of(part: str, i: int, seed: int, quick: bool, progress: Any = None) -> dict[str, Any]:
+    """A case, solved."""
     draw, solved = PARTS[part]
-    most = len(KNOWN) if part == "known" else chosen.n
-    wanted = range(most) if chosen.only is None else [i for i in chosen.only if i < most]
-    for i in tqdm(wanted, desc=part, file=sys.stderr, disable=not sys.stderr.isatty()):
-        case = draw(i, np.random.default_rng([chosen.seed, list(PARTS).index(part), i]))
-        clock = Clock()
-        found = solved(case, chosen.quick)
-        wall, compiling = clock.read()
-        row = {"part": part, "case": i, **case, **found, "solve_s": wall - compiling, "compile_s": compiling}
-        rows.append(row | {"load_average": os.getloadavg()[0]})
-        print(line(rows[-1]), flush=True)
-        if chosen.json:
-            with open(chosen.json, "w") as file:
-                json.dump({"seed": chosen.seed, "quick": chosen.quick, "rows": rows}, file, indent=1)
+    case = draw(i, np.random.default_rng([seed, list(PARTS).index(part), i]))
+    clock = Clock()
+    try:
+        found = solved(case, quick)
+    except Exception as problem:  # one case must not end the others
+        nothing = dict.fromkeys(("residual", "load_change", "CT"), float("nan"))
+        found = {"converged": False, "verdict_text": repr(problem), "iterations": 0} | nothing
+    wall, compiling = clock.read()
+    row = {"part": part, "case": i, **case, **found, "solve_s": wall - compiling, "compile_s": compiling}
+    return row | {"load_average": os.getloadavg()[0]}
+
+
+def solved_cases(pool: Pool, chosen: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Rows as they come; no case is begun after `until` seconds."""
+    begun, waiting, running = time.perf_counter(), cases_of(chosen), 0
+    with tqdm(total=len(waiting), file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
+        while True:
+            while waiting and running < pool.size and time.perf_counter() - begun < chosen.until:
+                pool.submit(waiting[0], Job(row_of, (*waiting.pop(0), chosen.seed, chosen.quick)))
+                running += 1
+            if not running:
+                return
+            for _, row in pool.finished():
+                running -= 1
+                bar.update()
+                yield row
+
+
+def kept(rows: list[dict[str, Any]], chosen: argparse.Namespace) -> None:
+    """Write what there is, all or nothing."""
+    file = Path(chosen.json)
+    written = file.with_name(f"{file.name}.new")
+    written.write_text(json.dumps({"seed": chosen.seed, "quick": chosen.quick, "rows": rows}, indent=1))
+    written.replace(file)
 
 
 def line(row: dict[str, Any]) -> str:
@@ -158,11 +216,24 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", type=int, metavar="I", help="these cases of the seed alone")
     parser.add_argument("--quick", action="store_true", help="coarser wakes")
     parser.add_argument("--json", help="file to write")
+    parser.add_argument("--jobs", type=int, default=1, help="processes that share the cases")
+    parser.add_argument("--until", type=float, default=np.inf, metavar="SECONDS", help="begin no case after these")
     chosen = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    as_seen_by_workers()
+    pool = Here() if chosen.jobs == 1 else Pinned(chosen.jobs)
     rows: list[dict[str, Any]] = []
-    for part in chosen.parts:
-        run_part(part, chosen, rows)
+    try:
+        for row in solved_cases(pool, chosen):
+            rows.append(row)
+            print(line(row), flush=True)
+            if chosen.json:
+                kept(rows, chosen)
+    except KeyboardInterrupt:
+        print("ended before the last case was solved")
+    finally:
+        pool.close()
     print("\n" + "\n".join(summary(part, rows) for part in chosen.parts))
 
 

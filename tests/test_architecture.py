@@ -9,7 +9,7 @@ import pytest
 
 PACKAGE = Path(__file__).parent.parent / "rotorjax"
 FLOORS = (  # from the ground up; a room may import from lower floors, and from earlier rooms of its own
-    ("errors", "checks", "frames", "io"),
+    ("errors", "checks", "device", "frames", "io"),
     ("ground", "region", "operating", "ode"),
     ("rotor", "potential"),
     ("inflow", "wake", "reference"),

@@ -26,6 +26,7 @@ from jaxtyping import Array, Bool, Float, Int, PyTree
 from rotorjax.checks import check_whole, shown
 from rotorjax.coupled import Coupled, CoupledState, Outputs, old_induced, rate_and_output
 from rotorjax.coupled_wake import CoupledWake
+from rotorjax.device import full_products, on_cpu
 from rotorjax.errors import InputError
 from rotorjax.ode.runge_kutta import RK4, told_step
 from rotorjax.rotor.hub import RotorInputs
@@ -138,9 +139,10 @@ def on_device(tree: PyTree) -> PyTree:
 def compiled(function: Callable, *args: Any) -> Callable:
     """A function's program for arguments of these shapes, static leaves bound. To be made inside `precision_of`."""
     arrays, static = eqx.partition(args, _is_array)
-    options = WIDE if jax.default_backend() == "cpu" else None
+    options = WIDE if on_cpu() else None
     program = jax.jit(lambda arrays: function(*eqx.combine(arrays, static)), compiler_options=options)
-    made = program.lower(arrays).compile()
+    with full_products():
+        made = program.lower(arrays).compile()
     return lambda *args: made(eqx.filter(args, _is_array))
 
 
@@ -238,7 +240,7 @@ def _several(one: Callable) -> Callable:
     """Of marches side by side: one after the other on a CPU, whose caches a single one fills, at once elsewhere."""
 
     def all_of(states: MarchState, controls: RotorInputs, p: Coupled) -> MarchState:
-        if jax.default_backend() == "cpu":
+        if on_cpu():
             return jax.lax.map(lambda both: one(*both, p), (states, controls))
         return jax.vmap(lambda s, u: one(s, u, p))(states, controls)
 

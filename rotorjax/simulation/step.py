@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.coupled import Coupled, CoupledState, Outputs, rate_and_output
 from rotorjax.coupled_wake import CoupledWake
+from rotorjax.device import cpu
 from rotorjax.errors import InputError
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import SimulationCase
@@ -62,14 +63,18 @@ def fastest_decay(x: CoupledState, u: RotorInputs, p: CoupledWake, rounds: int =
     many times faster than its time constant (wake/lifting_line.py).
     """
 
-    def rate(gamma: Float[Array, "B R"]) -> np.ndarray:
-        return np.asarray(instant(eqx.tree_at(lambda x: x.inflow.gamma_bound, x, gamma), u, p)[0].inflow.gamma_bound)
+    x, u, p = jax.device_get((x, u, p))
 
-    gamma = jax.device_get(x.inflow.gamma_bound)
-    here, size = rate(x.inflow.gamma_bound), 1e-6 * float(np.abs(gamma).max())
+    def rate(gamma: Float[Array, "B R"]) -> np.ndarray:
+        with cpu():
+            found = instant(eqx.tree_at(lambda x: x.inflow.gamma_bound, x, gamma), u, p)[0]
+        return np.asarray(found.inflow.gamma_bound)
+
+    gamma = x.inflow.gamma_bound
+    here, size = rate(gamma), 1e-6 * float(np.abs(gamma).max())
     way, found = np.random.default_rng(0).normal(size=gamma.shape), 0.0
     for _ in range(rounds):
         way *= size / np.linalg.norm(way)
-        way = rate(jnp.asarray(gamma + way)) - here
+        way = rate(gamma + way) - here
         found = float(np.linalg.norm(way)) / size
     return found

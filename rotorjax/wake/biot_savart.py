@@ -19,6 +19,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from rotorjax.device import on_cpu
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
@@ -43,9 +44,9 @@ def segment_velocity(
     """Velocity at points from straight segments with a strength (positive from start to end) and a core radius each.
 
     exponent: Vatistas n ≥ 1 (1 Scully, 2 Bagai–Leishman). plane: add the mirror image in this plane. blades: the
-    segments belong to one blade and repeat by rotation about the shaft. block: segments per step of the sum. products:
-    sum by matrix products, twice as fast and less exact next to thin cores (`kernel_sweeps._by_products`); derivatives
-    are the same.
+    segments belong to one blade and repeat by rotation about the shaft. block: segments per step of the sum; an
+    accelerator makes it in one unless told. products: on a CPU sum by matrix products, twice as fast and less exact
+    next to thin cores (`kernel_sweeps._by_products`); derivatives are the same.
 
     Raises InputError where shapes do not match, a core is negative or the exponent is below 1.
     """
@@ -175,8 +176,8 @@ def _settings(exponent: float, blades: int, block: int | None, chained: bool) ->
         raise InputError(f"Argument `blades` must be at least 1, but is {blades}")
     if block is not None and block < 1:
         raise InputError(f"Argument `block` must be at least 1, but is {block}")
-    # on a CPU eight rows of pairs stay in cache; an accelerator wants fewer and larger steps
-    return Settings(exponent, chained, block or (8 if jax.default_backend() == "cpu" else 64))
+    # on a CPU eight rows of pairs stay in cache; an accelerator wants all at once, or fewer and larger steps
+    return Settings(exponent, chained, block or (8 if on_cpu() else 64), at_once=not (block or on_cpu()))
 
 
 def _check_segments(points, strength, core, shape: tuple[int, ...]) -> None:

@@ -96,8 +96,13 @@ def pairs(points: Vector, nodes: Array, soft: Array, *, slice_r: bool = False) -
 def loose_pairs(points: Vector, start: Vector, end: Vector, soft: Array) -> Pairs:
     """Geometry of all pairs of N points and U segments that share no nodes."""
     r1, r2 = subtract(points, columns(start)), subtract(points, columns(end))
+    return between(r1, r2, columns(subtract(end, start)), soft[:, None])
+
+
+def between(r1: Vector, r2: Vector, edge: Vector, soft: Array) -> Pairs:
+    """Geometry of pairs whose r₁, r₂, edge and softening are known, whichever way segments and points run."""
     (d1, i1), (d2, i2) = _distance(r1), _distance(r2)
-    return Pairs(r1, r2, d1, d2, i1, i2, columns(subtract(end, start)), soft[:, None])
+    return Pairs(r1, r2, d1, d2, i1, i2, edge, soft)
 
 
 def _distance(r: Vector) -> tuple[Array, Array]:

@@ -5,14 +5,22 @@ between value and tangent nor keep reverse mode from storing every pair. A primi
 both rules. Second derivatives differentiate the rules themselves.
 """
 
+from typing import TYPE_CHECKING
+
 import jax
 from jax import Array
-from jax.experimental.hijax import VJPHiPrimitive, Zero, instantiate_zeros
+from jax.experimental import hijax
+from jax.experimental.hijax import Zero, instantiate_zeros
 
 from rotorjax.wake.kernel_sweeps import Segments, Settings, cotangents, velocity, velocity_and_tangent
 
+if TYPE_CHECKING:
+    from jax.experimental.hijax import VJPHiPrimitive as HiPrim
+else:  # its name since jax 0.11, and before
+    HiPrim = hijax.HiPrim if hasattr(hijax, "HiPrim") else hijax.VJPHiPrimitive
 
-class BiotSavart(VJPHiPrimitive):
+
+class BiotSavart(HiPrim):
     """Velocity (3, N) at points (3, N) induced by segments, with O(N + S) memory in every mode."""
 
     settings: Settings

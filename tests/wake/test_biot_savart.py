@@ -13,6 +13,7 @@ from scipy.special import ellipe, ellipk, iv, ivp, kv, kvp
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import plane
+from rotorjax.wake import biot_savart, kernel_sweeps
 from rotorjax.wake.biot_savart import filament_velocity, lattice_velocity, segment_velocity
 
 RNG = np.random.default_rng(7)
@@ -290,6 +291,25 @@ def case_like(args):
         strength.reshape(-1),
         core.reshape(-1),
     )
+
+
+@pytest.mark.parametrize("most", [7, 4096])
+def test_the_sum_for_an_accelerator_is_the_same(most, monkeypatch):
+    """Of loose segments, filaments and several wakes at once, in one step or in many."""
+    count = 50 + (most > 50)  # programs of their own
+    points, start, end, strength = normal(33, 3), normal(count, 3), normal(count, 3), normal(count)
+    core = jnp.full(count, 0.05)
+
+    def sums():
+        once = segment_velocity(points, start, end, strength, core, plane=plane(1.0), blades=3, products=True)
+        several = jax.vmap(lambda p: segment_velocity(p, start, end, strength, core))(points.reshape(3, 11, 3))
+        return once, filament_velocity(points, start[None], strength[None, 1:], core[None, 1:], exponent=2), several
+
+    expected = sums()
+    monkeypatch.setattr(biot_savart, "on_cpu", lambda: False)
+    monkeypatch.setattr(kernel_sweeps, "AT_ONCE", most)
+    for found, usual in zip(sums(), expected, strict=True):
+        np.testing.assert_allclose(found, usual, rtol=1e-11, atol=1e-12 * float(jnp.abs(usual).max()))
 
 
 def test_mirror_is_an_explicit_image_of_opposite_sense():

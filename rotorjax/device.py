@@ -1,0 +1,25 @@
+"""Where a program will run: what suits the caches of a CPU does not suit the many lanes of an accelerator."""
+
+from contextlib import AbstractContextManager, nullcontext
+
+import jax
+
+
+def on_cpu() -> bool:
+    """Whether what is traced now will run on a CPU: `jax.default_device` says so or, unset, jax's default backend."""
+    device = jax.config.values["jax_default_device"]
+    if device is None:
+        return jax.default_backend() == "cpu"
+    return (device if isinstance(device, str) else device.platform) == "cpu"
+
+
+def cpu() -> AbstractContextManager:
+    """In which to run a few small programs one after the other, each waited for: on the CPU."""
+    return nullcontext() if on_cpu() else jax.default_device(jax.devices("cpu")[0])
+
+
+def full_products() -> AbstractContextManager:
+    """In which to trace what must keep its digits: an accelerator would round the factors of matrix products in single
+    precision to ten bits, and so the slopes of a Runge-Kutta step. A CPU does not; asked for the same, it is slower.
+    """
+    return nullcontext() if on_cpu() else jax.default_matmul_precision("highest")
