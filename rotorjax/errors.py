@@ -13,6 +13,10 @@ class ArgumentError(InputError):
         super().__init__(f"Argument `{name}` must {rule}, but is {found}")
         self.name, self.rule, self.found = name, rule, found
 
+    def __reduce__(self) -> tuple:
+        """How another process gets it: an exception is made anew from `args`, which here is the whole sentence."""
+        return type(self), (self.name, self.rule, self.found)
+
     def under(self, where: str) -> InputError:
         """The same complaint about what the user wrote."""
         return InputError(f"{where} must {self.rule}, but is {self.found}")

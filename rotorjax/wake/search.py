@@ -31,8 +31,8 @@ tenth of one of Newton's iterations, and from a rough guess these wander.
 """
 
 MOST, MOST_SLICES = 10, 16
-"""Newton iterations at one model, of an axisymmetric wake and of all slices: what takes more is found sooner by a smaller
-step of the continuation.
+"""Newton iterations at one model, of an axisymmetric wake and of all slices: what takes more is found sooner by a
+smaller step of the continuation.
 """
 
 DISTANT = 2.0
