@@ -6,14 +6,17 @@ Most of the tests' time is compilation. The cache is shared by the workers, by t
 the commands that the tests start, which get it through the environment.
 """
 
+import gc
 import os
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
-# XLA's older way to write fused loops and LLVM's least work: the same sums, and half to compile; read when jax starts
+# XLA's older way to write fused loops and LLVM's first level: the same sums, and half to compile; read when jax starts.
+# Level 0 halves that again, but its programs run three times as long: for all but the study and a wake's linear map
 os.environ["XLA_FLAGS"] = (
-    f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=0"
+    f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
 )
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's own hints are no errors
 
 import jax
@@ -22,8 +25,16 @@ import pytest
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 MOST_MAPPINGS = 15_000  # about 3 GB of programs and what they hold
 SHORTEST = 0.3  # seconds of compilation that are worth a file
+MUCH_RUN = {
+    "xla_backend_optimization_level": 1,
+    "xla_llvm_disable_expensive_passes": False,
+    "xla_cpu_use_fusion_emitters": True,
+}
+
+gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other
 
 jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_disable_most_optimizations", True)
 jax.config.update("jax_compilation_cache_dir", CACHE)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", SHORTEST)
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", CACHE)
@@ -38,6 +49,14 @@ def pytest_collection_modifyitems(items):
         return 0 if item.path.name == "test_documents.py" else 1 if item.path in slow else 2
 
     items.sort(key=order)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def products_run_fast():
+    """The linear map of a residual, which GMRES applies some hundred times in a solve, is compiled to be run."""
+    from rotorjax.ode import linear
+
+    linear._product = jax.jit(linear._product.__wrapped__, compiler_options=MUCH_RUN)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -16,7 +16,8 @@ from rotorjax.cli import WITHOUT_FREE_WAKE
 
 @pytest.mark.parametrize("flags", ["", WITHOUT_FREE_WAKE], ids=["default", "without free wake"])
 def test_users_programs_are_right_at_the_size_that_broke(flags):
-    env = os.environ | {"XLA_FLAGS": flags, "JAX_ENABLE_COMPILATION_CACHE": "false"}
+    switches = {"JAX_ENABLE_COMPILATION_CACHE": "false", "JAX_DISABLE_MOST_OPTIMIZATIONS": "false"}
+    env = os.environ | switches | {"XLA_FLAGS": flags}
     script = Path(__file__).with_name("canary.py")
     ran = subprocess.run([sys.executable, str(script)], env=env, capture_output=True, text=True, check=False)
     assert ran.stdout == "right\n", ran.stderr

@@ -44,7 +44,9 @@ def clone(tmp_path_factory):
 
 
 def sh(text, folder):
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV", "PYTEST"))}
+    """With programs compiled as XLA_FLAGS say: the study runs longer than it compiles."""
+    left_out = ("PYTHON", "VIRTUAL_ENV", "PYTEST", "JAX_DISABLE_MOST_OPTIMIZATIONS")
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(left_out)}
     return subprocess.run(["sh", "-euc", text], cwd=folder, env=clean, capture_output=True, text=True, check=False)
 
 

@@ -103,13 +103,12 @@ def test_a_free_wake_solved_and_differentiated(uh60, wake, tmp_path):
         return rj.solve(rj.free_wake(*uh60, rj.plane(height), SETTINGS), start=wake, tol=1e-10).CT
 
     value, slope = jax.jit(jax.value_and_grad(thrust))(1.0)
-    step = 1e-3
-    near = (thrust(1.0 + step) - thrust(1.0 - step)) / (2 * step)
     assert float(value) == pytest.approx(wake.CT, rel=1e-6)
-    assert float(slope) == pytest.approx(float(near), rel=1e-4)
     assert float(jax.jacfwd(thrust)(1.0)) == pytest.approx(float(slope), rel=1e-8)
-    pair = jax.vmap(thrust)(jnp.array([1.0, 1.001]))
-    np.testing.assert_allclose(pair, [value, thrust(1.001)], rtol=1e-8)
+    step = 1e-3
+    ends = jax.vmap(thrust)(jnp.array([1.0 - step, 1.0 + step]))
+    assert float(ends[1]) == pytest.approx(float(thrust(1.0 + step)), rel=1e-8)
+    assert float(slope) == pytest.approx(float(ends[1] - ends[0]) / (2 * step), rel=1e-4)
 
 
 @pytest.mark.slow

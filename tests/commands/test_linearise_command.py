@@ -17,7 +17,9 @@ from rotorjax.wake.settings import wake_settings
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr("rotorjax.bench.settings.quick_settings", lambda **more: wake_settings(**COARSE | more))
+    monkeypatch.setattr(
+        "rotorjax.bench.settings.quick_settings", lambda **more: wake_settings(**COARSE | {"azimuths": 4} | more)
+    )
 
 
 @pytest.mark.slow

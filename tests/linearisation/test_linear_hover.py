@@ -52,6 +52,7 @@ def model(base):
     return hover_model(base, INPUTS, OUTPUTS)
 
 
+@pytest.mark.slow
 def test_waves_are_the_equations_of_all_blades_from_any_azimuth(base, model):
     """A random disturbance of every state and input; columns were made at ψ = 0 by moving one blade."""
     rng, members = np.random.default_rng(0), members_of(base.orbit.start, 4)

@@ -69,6 +69,7 @@ def test_on_one_shaft_each_sees_the_mean_flow_of_the_other(uh60, alone):
     np.testing.assert_allclose(added[: len(control), 1], -np.asarray(upper)[:, 1], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial, alone):
     """Less than one actuator disk would (√2), the lower rotor more than the upper one."""
     assert coaxial.converged, coaxial.why
@@ -79,6 +80,7 @@ def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial,
     assert coaxial.collective_deg[0] < coaxial.collective_deg[1]
 
 
+@pytest.mark.slow
 def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
     coaxial.plot(tmp_path / "pair.png")
     coaxial.to_vtk(tmp_path / "pair.vtp")
