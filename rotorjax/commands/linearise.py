@@ -53,7 +53,8 @@ def run(chosen: argparse.Namespace) -> int:
     trimmed = chosen.thrust_coefficient is not None or chosen.weight is not None
     if not trimmed:
         return _wake(chosen)
-    return _hovers(chosen) if chosen.inflow == "freewake" else _flights(chosen)
+    flies = any(speed for speed in [*(chosen.advance_ratio or []), *(chosen.speed or [])])
+    return _hovers(chosen) if chosen.inflow == "freewake" and not flies else _flights(chosen)
 
 
 def _flights(chosen: argparse.Namespace) -> int:
@@ -62,7 +63,8 @@ def _flights(chosen: argparse.Namespace) -> int:
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, flight_output, schedule
 
-    _refuse(chosen, {"quick": False, "collective": None}, "belongs to a free wake, or to one of rigid blades")
+    usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
+    _refuse(chosen, usual, "belongs to a free wake, or to one of rigid blades")
     wanted, requests = _wanted(chosen), _requests(chosen)
     for request in requests:
         flight.check(request, wanted)

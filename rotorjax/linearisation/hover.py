@@ -175,18 +175,12 @@ def hover_model(
         names=tuple(names[k].replace("_0", "_{}", 1) for k in members[0]),
         units=tuple(units[k] for k in members[0]),
         inputs=tuple(inputs),
-        outputs=_expanded(outputs, stations(base.p).size),
+        outputs=readings.expanded(outputs, stations(base.p).size),
         u=np.array([float(base.u[name]) for name in inputs]),
         y=value,
         x={name: flat[k] for name, k in zip(order, members, strict=True)},
         notes=rotor.notes(base),
     )
-
-
-def _expanded(outputs: Sequence[str], count: int) -> tuple[str, ...]:
-    """Names of single outputs: section loads have one for every station."""
-    several = {name: [f"{name}[{i}]" for i in range(count)] for name in outputs if name.startswith(readings.LIFT)}
-    return tuple(one for name in outputs for one in several.get(name, [name]))
 
 
 def _check(base: Base, inputs: Sequence[str], outputs: Sequence[str]) -> None:
