@@ -95,8 +95,9 @@ def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
     check_request(request)
     if not request.advance or request.slope_deg:
         raise InputError(
-            "Argument `advance_ratio` must not be 0, and `slope` must be, for a periodic model in the free wake, but are "
-            f"{request.advance:g} and {request.slope_deg:g}: level hover is linearised by linearisation.hover_flight"
+            "Arguments must ask for a flight over level ground or none where the free wake's model is periodic "
+            f"(`advance_ratio` not 0, `slope` 0), but are {request.advance:g} and {request.slope_deg:g}: "
+            "linearisation.hover_flight has level hover"
         )
     settings = request.wake or flight_settings(request.rotor.blades)
     wake = coupled_wake(request.rotor, request.operating, settings, request.ground)

@@ -157,12 +157,12 @@ def _wake_report(wake: InWake) -> str:
     thrust = "" if np.isnan(wake.thrust) else f" (C_T = {wake.thrust:.5f})"
     middle, most = 100 * np.median(wake.condensed_error), 100 * wake.condensed_error.max()
     return (
-        f"## In the free wake\n\nThe equations that are marched have {wake.states} states here. They were linearised at "
-        f"{wake.azimuths} azimuths about the periodic march next to the trim{thrust}, and condensed to the periodic model "
-        f"by what inputs reach and outputs show in {TURNS:g} revolutions: its steps differ over a revolution by "
+        f"## In the free wake\n\nThe equations that are marched have {wake.states} states here. They were linearised "
+        f"at {wake.azimuths} azimuths about the periodic march next to the trim{thrust}, and condensed to the periodic "
+        f"model by what inputs reach and outputs show in {TURNS:g} revolutions: its steps differ over a revolution by "
         f"{middle:.2g} % in the median of all responses and {most:.2g} % at most. Differences from the nonlinear march "
-        f"below are those of all {wake.states} states, and so are these leading exponents, named by whose share in them "
-        "is largest:\n\n" + table(("mode", "growth", "frequency", "share"), rows) + "\n\n"
+        f"below are those of all {wake.states} states, and so are these leading exponents, named by whose share in "
+        "them is largest:\n\n" + table(("mode", "growth", "frequency", "share"), rows) + "\n\n"
     )
 
 

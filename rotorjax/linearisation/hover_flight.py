@@ -48,8 +48,8 @@ def check(request: Request, wanted: Wanted) -> None:
     for name, value in (("advance_ratio", request.advance), ("tilt", request.tilt_deg), ("slope", request.slope_deg)):
         if value:
             raise InputError(
-                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is {value:g}: take "
-                "pitt-peters or vpbfsm there"
+                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is {value:g}: "
+                "linearisation.flight has level flight, pitt-peters and vpbfsm the rest"
             )
     blades = request.rotor.blades
     if blades < 3:

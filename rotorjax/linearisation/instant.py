@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 from rotorjax.coupled import blades_at, rate_in
 from rotorjax.coupled_wake import CoupledWake, model_of
 from rotorjax.linearisation.drive import Drive, driven
-from rotorjax.linearisation.hover import Flat, members_of
+from rotorjax.linearisation.hover import Flat, members_of, products, pulled
 from rotorjax.linearisation.rotor import SteadyState, coupled_state
 from rotorjax.rotor import multiblade
 from rotorjax.wake.field import node_velocities
@@ -49,27 +49,16 @@ def instant(
     z, n = jnp.concatenate([flat, jnp.stack([u[name] for name in inputs])]), flat.size
     members = members_of(x, blades)
     moved = np.concatenate([members[:, :MOTIONS].ravel(), np.arange(n, z.size)])
+    function = Flat(x, tuple(inputs), tuple(outputs))
     along = np.zeros((moved.size, z.size))
     along[np.arange(moved.size), moved] = 1.0
-    function = Flat(x, tuple(inputs), tuple(outputs))
-    y, columns, rows = map(np.asarray, both_ways(function, z, psi, u, p, jnp.asarray(along)))
+    y, rows = (np.asarray(part) for part in pulled(function, z, psi, u, p))
     whole = np.zeros((n, z.size))
-    whole[:, moved] = columns[:, :n].T
+    whole[:, moved] = products(function, z, psi, u, p, along)[:, :n].T
     wake, rates = members[:, MOTIONS:], members[:, [1, 3]]  # a blade's flap, its rate, lag and its rate come first
     into = np.concatenate([rates, wake], axis=1).ravel()
     whole[np.ix_(into, wake.ravel())] = np.asarray(by_wake(psi, x, u, p)).reshape(into.size, wake.size)
     return Instant(whole[:, :n], whole[:, n:], rows[:, :n], rows[:, n:], y)
-
-
-@eqx.filter_jit
-def both_ways(
-    function: Flat, z: Array, psi: Array, u: Drive, p: CoupledWake, along: Float[Array, "k N"]
-) -> tuple[Float[Array, " q"], Float[Array, "k M"], Float[Array, "q N"]]:
-    """Outputs; rates and outputs along directions; outputs by everything: one linearisation, forwards and back."""
-    (rates, y), product = jax.linearize(lambda z: function(z, psi, u, p), z)
-    columns = jax.lax.map(lambda v: jnp.concatenate(product(v)), along)
-    back = jax.linear_transpose(product, z)
-    return y, columns, jax.lax.map(lambda row: back((jnp.zeros_like(rates), row))[0], jnp.eye(y.size))
 
 
 @eqx.filter_jit

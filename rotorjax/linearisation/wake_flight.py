@@ -25,6 +25,7 @@ from rotorjax.ode.hill import Exponents, exponents
 from rotorjax.ode.models import PeriodicModel
 from rotorjax.ode.orbit import require_converged
 from rotorjax.ode.repeated import Leading, Repeated, leading
+from rotorjax.trim.run import Result
 
 Tell = Callable[[str, float], None]
 COUNT = 20
@@ -141,6 +142,17 @@ def linear_in_flight(
         steps.largest_gap(unit * sizes, own * sizes),
         thrust,
     )
+
+
+def periodic_in_wake(
+    found: Result, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
+) -> PeriodicModel:
+    """The condensed model of a trim alone; names as in `rotor.linear_rotor`. Raises InputError as `all_states` does."""
+    base = base_in_flight(rotor.base_of(found.trimmed), rotor.AZIMUTHS)
+    known = rotor.output_names(base.p, "height" in base.u)
+    chosen = [name for name in known if not name.startswith(readings.LIFT)] if outputs is None else outputs
+    ins = rotor.drive_names(base.u) if inputs is None else inputs
+    return condense(all_states(base, ins, chosen), base)[0]
 
 
 def wake_modes(found: Leading, states: tuple[str, ...]) -> tuple[Mode, ...]:

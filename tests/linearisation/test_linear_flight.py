@@ -17,8 +17,8 @@ from rotorjax.errors import InputError
 from rotorjax.linearisation import flight, wake_flight
 from rotorjax.linearisation.condensed import condensed
 from rotorjax.linearisation.drive import drive_of
-from rotorjax.linearisation.hover import Flat
-from rotorjax.linearisation.instant import both_ways, instant
+from rotorjax.linearisation.hover import Flat, products
+from rotorjax.linearisation.instant import instant
 from rotorjax.linearisation.rotor import Base, SteadyState
 from rotorjax.linearisation.settled import Passage, mirrored, settled
 from rotorjax.ode.orbit import make_orbit
@@ -32,9 +32,16 @@ from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.start import prescribed
 
-INPUTS, OUTPUTS = ("theta_0", "theta_1c", "w", "q"), ("CT", "M", "beta_1s", "lag_D")
+INPUTS, OUTPUTS = ("theta_0", "theta_1c", "q", "w"), ("CT", "M", "beta_1s", "lambda_1c", "lift_0")
 TINY = {**COARSE, "panels": 4, "closure_turns": 0, "closure_bundles": 0, "age_step_deg": 30.0, "near_wake_deg": 120.0}
-THICK = {"free_turns": 0.5, "tip_core": 0.1, "near_core": 0.1, "control_core": 0.05, "circulation_lag": 0.4}
+THICK = {
+    "free_turns": 4 / 12,
+    "inboard": (0.45,),
+    "tip_core": 0.1,
+    "near_core": 0.1,
+    "control_core": 0.05,
+    "circulation_lag": 0.4,
+}
 
 
 @pytest.fixture(scope="module")
@@ -64,9 +71,8 @@ def test_matrices_are_those_of_forward_mode(base):
     rng, psi, x = np.random.default_rng(0), base.orbit.t[0] + 0.3, base.orbit.start
     found = instant(psi, x, base.u, base.p, INPUTS, OUTPUTS)
     z = jnp.concatenate([ravel_pytree(x)[0], jnp.stack([base.u[name] for name in INPUTS])])
-    n, along = found.a.shape[0], np.zeros((16 + len(INPUTS), z.size))
-    along[0] = rng.normal(size=z.size)
-    truth = np.asarray(both_ways(Flat(x, INPUTS, OUTPUTS), z, psi, base.u, base.p, jnp.asarray(along))[1])[0]
+    n, along = found.a.shape[0], rng.normal(size=(1, z.size))
+    truth = products(Flat(x, INPUTS, OUTPUTS), z, psi, base.u, base.p, along)[0]
     v, w = along[0, :n], along[0, n:]
     np.testing.assert_allclose(found.a @ v + found.b @ w, truth[:n], atol=1e-11 * np.abs(truth[:n]).max())
     np.testing.assert_allclose(found.c @ v + found.d @ w, truth[n:], atol=1e-11 * np.abs(truth[n:]).max())
@@ -93,12 +99,14 @@ def test_steps_and_starts_march_as_the_nonlinear_equations_do(base, model):
 
 
 def test_leading_exponents_are_those_of_the_dense_monodromy_matrix(model):
+    model = model.halved()
     matrix = model.across(np.eye(model.part.order))
-    np.testing.assert_allclose(model.across_back(np.eye(len(matrix))), matrix.T, atol=1e-12 * np.abs(matrix).max())
-    found, values = leading(model, 8), np.linalg.eigvals(matrix)
+    some = np.eye(len(matrix))[:, ::40]
+    np.testing.assert_allclose(model.across_back(some), matrix[::40].T, atol=1e-12 * np.abs(matrix).max())
+    found, values = leading(model, 8, depth=20), np.linalg.eigvals(matrix)
     largest = values[np.argsort(-np.abs(values))][: found.values.size]
-    np.testing.assert_allclose(np.sort(np.abs(found.multipliers)), np.sort(np.abs(largest)), rtol=1e-5)
-    assert found.residuals.max() < 1e-4
+    np.testing.assert_allclose(np.sort(np.abs(found.multipliers)), np.sort(np.abs(largest)), rtol=1e-4)
+    assert found.residuals.max() < 1e-3
     np.testing.assert_allclose(
         np.exp(found.values * np.pi), found.multipliers**2, rtol=1e-9
     )  # signs are back after two
@@ -109,6 +117,7 @@ def test_leading_exponents_are_those_of_the_dense_monodromy_matrix(model):
 
 
 def test_a_condensed_model_keeps_the_blades_and_the_steps(model):
+    model = model.halved()
     truth = model.step(4)
     errors = []
     for states in (20, 60):
@@ -117,11 +126,11 @@ def test_a_condensed_model_keeps_the_blades_and_the_steps(model):
         assert small.states[:2] == ("beta_0", "beta_1c")
         own = np.stack([small.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
         errors.append(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0))
-    assert np.median(errors[1]) < min(0.01, np.median(errors[0]))
+    assert np.median(errors[1]) < min(0.05, np.median(errors[0]))
 
 
 BAD = {
-    "`advance_ratio` must not be 0": ({}, {}),
+    "`advance_ratio` not 0": ({}, {}),
     "has 'gust_aft'": ({"advance": 0.15}, {"inputs": ("gust_aft",)}),
     "has 'clearance_aft'": ({"advance": 0.15}, {"outputs": ("clearance_aft",)}),
     "`order` must be at least 13": ({"advance": 0.15}, {"order": 12}),
