@@ -84,8 +84,8 @@ def linearise(
         periodic, flown = periodic_in_wake(about, named(inputs), named(outputs)), about.request
     else:
         raise InputError(
-            "Argument `about` must be a free wake of rigid blades in hover, a trim with inflow 'uniform', 'pitt-peters' "
-            "or 'vpbfsm', or one in forward flight, but is none of these: trim so"
+            "Argument `about` must be a free wake of rigid blades in hover, a trim with inflow 'uniform', "
+            "'pitt-peters' or 'vpbfsm', or one in forward flight, but is none of these: trim so"
         )
     if harmonics is None:
         if order is not None:

@@ -64,7 +64,9 @@ def instant(
 @eqx.filter_jit
 def by_wake(psi: Array, x: SteadyState, u: Drive, p: CoupledWake) -> Float[Array, "B 2+n B n"]:
     """Derivative of each coordinate's flap and lag accelerations and wake rates by the wakes of all coordinates."""
-    hub, p = driven(u, p)
+    hub, moved = driven(u, p)
+    assert isinstance(moved, CoupledWake)
+    p = moved
     state, blades = coupled_state(psi, x, p), p.rotor.blades
     to, back = multiblade.transform(psi, blades), multiblade.inverse(psi, blades)
     model = model_of(hub, blades_at(state, hub, p), p)

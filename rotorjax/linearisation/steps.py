@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 
 @eqx.filter_jit
 def _read(times, states, u, p):
-    return jax.lax.map(lambda at: outputs(*at, u, p), (times, states))
+    return jax.lax.map(lambda at: outputs(at[0], at[1], u, p), (times, states))
 
 
 def marched(

@@ -77,6 +77,7 @@ def all_states(base: Base, inputs: Sequence[str], outputs: Sequence[str], progre
     Raises InputError where no periodic march was found or a name is unknown.
     """
     require_converged(base.orbit)
+    assert isinstance(base.p, CoupledWake)
     check_names("inputs", inputs, rotor.drive_names(base.u), base.model)
     check_names("outputs", outputs, rotor.output_names(base.p, "height" in base.u), base.model)
     names, units = rotor.state_names(base.orbit.start, base.p)
@@ -93,7 +94,10 @@ def all_states(base: Base, inputs: Sequence[str], outputs: Sequence[str], progre
         t=np.asarray(base.orbit.t),
         period=float(base.orbit.period),
         a=a,
-        **{key: np.stack([getattr(one, key) for one in found]) for key in ("b", "c", "d", "y")},
+        b=np.stack([one.b for one in found]),
+        c=np.stack([one.c for one in found]),
+        d=np.stack([one.d for one in found]),
+        y=np.stack([one.y for one in found]),
         states=names,
         inputs=tuple(inputs),
         outputs=outs,

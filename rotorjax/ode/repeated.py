@@ -72,8 +72,8 @@ class Repeated:
 
     def leap(self, k: int, x: Block, u: np.ndarray | None = None) -> Block:
         """States (n, m) after step k of a part with inputs held."""
-        rates = [partial(self._rate, j, u=u) for j in (2 * k, 2 * k + 1, 2 * k + 2)]
-        return _runge_kutta(*rates, x, self.dt)
+        first, middle, last = (partial(self._rate, j, u=u) for j in (2 * k, 2 * k + 1, 2 * k + 2))
+        return _runge_kutta(first, middle, last, x, self.dt)
 
     def _transposed(self) -> "Repeated":
         """With Aᵀ for A, for `leap_back`."""
@@ -81,8 +81,8 @@ class Repeated:
 
     def leap_back(self, k: int, y: Block) -> Block:
         """Of the transposed model: the transpose of this one's free step k, by the same method from its end."""
-        rates = [partial(self._rate, j, u=None) for j in (2 * k + 2, 2 * k + 1, 2 * k)]
-        return _runge_kutta(*rates, y, self.dt)
+        first, middle, last = (partial(self._rate, j, u=None) for j in (2 * k + 2, 2 * k + 1, 2 * k))
+        return _runge_kutta(first, middle, last, y, self.dt)
 
     def across(self, x: Block) -> Block:
         """Free states a part later, called as at its start."""
@@ -163,7 +163,7 @@ def leading(model: Repeated, count: int, width: int = WIDTH, depth: int = DEPTH)
     others, left, _ = _ritz(model.across_back, model.part.order, width, depth)
     order = np.argsort(-np.abs(values))
     last = order[count - 1]
-    if values[last].imag and np.abs(values[last].conj() - values[order[:count]]).min() > 1e-9:
+    if np.imag(values[last]) and np.abs(np.conj(values[last]) - values[order[:count]]).min() > 1e-9:
         count += 1  # the other one of the last pair
     order = order[:count]
     near = [int(np.argmin(np.abs(others - values[k]))) for k in order]

@@ -122,7 +122,7 @@ def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -
         start, end = (rotate_about_shaft(ends, angle) for ends in (whole.start, whole.end))
         return _kernel_form(whole._replace(start=start, end=end))
 
-    targets, segments = (jax.vmap(f)(flat, numbers, angles) for f in (nodes, everything))
+    targets, segments = jax.vmap(nodes)(flat, numbers, angles), jax.vmap(everything)(flat, numbers, angles)
     moved = jax.vmap(jax.jacfwd(nodes))(flat, numbers, angles)
 
     def at_blade(one):
