@@ -58,7 +58,7 @@ def instant(
     wake, rates = members[:, MOTIONS:], members[:, [1, 3]]  # a blade's flap, its rate, lag and its rate come first
     into = np.concatenate([rates, wake], axis=1).ravel()
     whole[np.ix_(into, wake.ravel())] = np.asarray(by_wake(psi, x, u, p)).reshape(into.size, wake.size)
-    return Instant(whole[:, :n], whole[:, n:], rows[:, :n], rows[:, n:], y)
+    return Instant(whole[:, :n], whole[:, n:].copy(), rows[:, :n], rows[:, n:], y)  # a view would keep all of it
 
 
 @eqx.filter_jit
