@@ -85,7 +85,7 @@ def linearise(
     else:
         raise InputError(
             "Argument `about` must be a free wake of rigid blades in hover, a trim with inflow 'uniform', "
-            "'pitt-peters' or 'vpbfsm', or one in forward flight, but is none of these: trim so"
+            "'pitt-peters' or 'vpbfsm', or one in forward flight, but is neither of these: trim so"
         )
     if harmonics is None:
         if order is not None:
