@@ -8,11 +8,15 @@ Prints, for each inflow and flight:
    response's largest value: worst over C_T, L, M, blades' flap and inflow, and over every output;
 4. exponents by design parameters against central differences, relative to the largest.
 
-    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--json FILE]
+5. with --wake, the free wake at μ = .15: seconds of each stage from the trim on (compilation in the first of each),
+   peak memory, the errors of 2 and 3, those of the condensed model, and the leading exponents.
+
+    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--json FILE]
 """
 
 import argparse
 import json
+import resource
 import time
 
 import equinox as eqx
@@ -83,6 +87,33 @@ def row(inflow, name, order):
     }
 
 
+def wake_row(order):
+    """The free wake in forward flight."""
+    found = flight.linearise_flight(request("uh60", THRUST, "freewake", advance=0.15), flight.Wanted(order=order))
+    if not isinstance(found, flight.LinearFlight):
+        raise SystemExit(f"freewake, μ = .15: {found.trimmed.outcome.why}")
+    model, wake = found.periodic, found.wake
+    where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
+    main, ins = [model.outputs.index(n) for n in MAIN], [model.inputs.index(n) for n in STEPPED]
+    return {
+        "inflow": "freewake",
+        "flight": "μ = .15",
+        "states": wake.states,
+        "azimuths": wake.azimuths,
+        "stages_s": found.seconds,
+        "peak_GB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
+        "gap_db": {k: float(found.small.gap_db[v]) for k, v in where.items()},
+        "gap_deg": {k: float(found.small.gap_deg[v]) for k, v in where.items()},
+        "step_error_main": {n: float(wake.step_error[main, m].max()) for n, m in zip(STEPPED, ins, strict=True)},
+        "step_error_median": float(np.median(wake.step_error)),
+        "condensed_error_main": {
+            n: float(wake.condensed_error[main, m].max()) for n, m in zip(STEPPED, ins, strict=True)
+        },
+        "condensed_error_median": float(np.median(wake.condensed_error)),
+        "modes": {m.name: [m.exponent.real, m.exponent.imag] for m in found.modes},
+    }
+
+
 def derivatives(trimmed):
     """Largest gap of the exponents' derivatives from central differences, over the largest derivative."""
     gaps = {}
@@ -102,6 +133,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--inflow", nargs="+", default=["pitt-peters"])
     parser.add_argument("--order", type=int, default=20)
+    parser.add_argument("--wake", action="store_true", help="the free wake in forward flight too, some minutes")
     parser.add_argument("--json", help="file to write")
     chosen = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
@@ -121,6 +153,9 @@ def main():
             if inflow == "pitt-peters" and name in ("hover", "μ = .15"):
                 found[name] = derivatives(result.trimmed)
                 print("  derivatives:", ", ".join(f"{k} {v:.0e}" for k, v in found[name].items()), flush=True)
+    if chosen.wake:
+        rows.append(wake_row(chosen.order))
+        print(json.dumps(rows[-1], indent=1, ensure_ascii=False))
     if chosen.json:
         with open(chosen.json, "w") as file:
             json.dump({"flights": rows, "derivatives": found}, file, indent=1)

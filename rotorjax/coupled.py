@@ -22,6 +22,7 @@ from rotorjax.rotor.flap_lag import Blade, blade_of
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs, TurningFrame, pitch, turning_frame
 from rotorjax.rotor.moving_blade import AirLoads, Sections, air_loads, blade_sections, places
+from rotorjax.wake.field import Velocities
 
 
 class RotorState(eqx.Module):
@@ -128,6 +129,11 @@ def rate_and_output(
     return _rate(found, x, u), _output(found, u, p)
 
 
+def rate_in(x: CoupledState, u: RotorInputs, p: CoupledWake, velocities: Velocities) -> CoupledState:
+    """`rhs` in given velocities of the air at control points and wake nodes: what is left of it without the pairs."""
+    return _rate(_evaluate(x, u, p, velocities=velocities), x, u)
+
+
 def old_induced(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Float[Array, "B N 3"]:
     """What closure and ground of a free wake induce at its nodes, seen from the blades: it changes slowly."""
     return old_in(x.inflow, u, blades_at(x, u, p), p)
@@ -203,12 +209,18 @@ def _pitch(psi: Float[Array, " B"], q: Float[Array, "B 2"], u: RotorInputs, p: C
     return pitch(u, psi) - p.blade.coupling * (q[:, 0] - p.blade.precone)
 
 
-def _evaluate(x: CoupledState, u: RotorInputs, p: Coupled, old: Float[Array, "B N 3"] | None = None) -> _Evaluation:
+def _evaluate(
+    x: CoupledState,
+    u: RotorInputs,
+    p: Coupled,
+    old: Float[Array, "B N 3"] | None = None,
+    velocities: Velocities | None = None,
+) -> _Evaluation:
     psi, q, q_dot = _angles(x, u, p)
     frames = jax.vmap(lambda psi: turning_frame(u, psi, p.blade.gravity))(psi)
     theta = _pitch(psi, q, u, p)
     if isinstance(p, CoupledWake):
-        air, inflow = in_wake(x.inflow, u, blades_at(x, u, p), p, old)
+        air, inflow = in_wake(x.inflow, u, blades_at(x, u, p), p, old, velocities)
     else:
         air, inflow = _in_inflow(x.inflow, u, p, psi, frames, q, q_dot, theta)
     q_dot_dot = jax.vmap(lambda *a: flap_lag.accelerations(p.blade, *a))(frames, q, q_dot, air.moment)

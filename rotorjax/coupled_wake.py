@@ -21,7 +21,7 @@ from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.wake.dynamics import carried_on, driven
-from rotorjax.wake.field import node_velocities, old_velocities, undisturbed, velocity_now
+from rotorjax.wake.field import Velocities, node_velocities, old_velocities, undisturbed, velocity_now
 from rotorjax.wake.lifting_line import bound_line
 from rotorjax.wake.loads import WakeInputs
 from rotorjax.wake.model import Flight, FreeWake, WakeState
@@ -100,14 +100,21 @@ def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
 
 
 def in_wake(
-    state: WakeState, u: RotorInputs, blades: BladesAt, p: CoupledWake, old: Float[Array, "B N 3"] | None = None
+    state: WakeState,
+    u: RotorInputs,
+    blades: BladesAt,
+    p: CoupledWake,
+    old: Float[Array, "B N 3"] | None = None,
+    velocities: Velocities | None = None,
 ) -> tuple[AirLoads, WakeState]:
     """Air loads of all blades, leading axis B, and the rate of the wake, per radian of Ω_ref t.
 
-    old: what closure and ground induce at all nodes (`wake.field.old_velocities`), None to sum it up here.
+    old: what closure and ground induce at all nodes (`wake.field.old_velocities`), None to sum it up here. velocities:
+    of the air at control points and nodes where they are known, and no pair is summed.
     """
     model = model_of(u, blades, p)
-    velocities = node_velocities(model, state, blades.psi[0], old)
+    if velocities is None:
+        velocities = node_velocities(model, state, blades.psi[0], old)
     line = bound_line(model, velocities.control, state, _inputs(u))
     air = wake_air_loads(model, line.control, line.loads, blades.psi)
     return air, carried_on(state, velocities, line.gamma, model)

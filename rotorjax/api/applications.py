@@ -50,13 +50,14 @@ def linearise(
     order: int | None = None,
     time: "Time" = "azimuth",
 ) -> "LinearModel | PeriodicModel":
-    """Linearise the equations that are marched, about a trim with an inflow model or a rigid rotor's hovering wake.
+    """Linearise the equations that are marched, about a trim with an inflow model, a trimmed flight in the free wake
+    (condensed to a hundred states beside the blades') or a rigid rotor's hovering wake.
 
     inputs, outputs: names (`linearisation.drive`, `.readings` have them), None for all. harmonics: those that the
     time-invariant model keeps, (0,) for the mean; None for the model that is periodic in azimuth. order: states of a
     reduced model of a trim, which keeps those of the blades. time: "azimuth" (rad, rotor units) or "seconds" (SI).
-    Raises InputError where it has not converged, a name is unknown or the order too low, and for a trim in the free
-    wake or a finite-state hover, which have no linear model here.
+    Raises InputError where it has not converged, a name is unknown or the order too low, and for a hover trimmed in the
+    free wake (`linearisation.hover_flight` has it) or with the finite-state model alone.
 
     >>> import rotorjax as rj
     >>> hover = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", azimuths=8)
@@ -67,6 +68,7 @@ def linearise(
     from rotorjax.linearisation.handover import handed_over
     from rotorjax.linearisation.rotor import base_of, linear_rotor
     from rotorjax.linearisation.system import linear_wake
+    from rotorjax.linearisation.wake_flight import periodic_in_wake
     from rotorjax.ode.harmonic import harmonic_model
     from rotorjax.trim.run import Result
     from rotorjax.trim.solve import Trimmed
@@ -78,10 +80,12 @@ def linearise(
         periodic, flown = linear_wake(about.found, named(inputs), named(outputs)), about.model
     elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
         periodic, flown = linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
+    elif isinstance(about, Result) and about.request.advance:
+        periodic, flown = periodic_in_wake(about, named(inputs), named(outputs)), about.request
     else:
         raise InputError(
-            "Argument `about` must be a free wake in hover or a trim with inflow 'uniform', 'pitt-peters' or 'vpbfsm', "
-            "but is neither: trim with one of these"
+            "Argument `about` must be a free wake of rigid blades in hover, a trim with inflow 'uniform', "
+            "'pitt-peters' or 'vpbfsm', or one in forward flight, but is neither of these: trim so"
         )
     if harmonics is None:
         if order is not None:

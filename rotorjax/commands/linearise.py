@@ -22,10 +22,10 @@ def register(commands: argparse._SubParsersAction) -> None:
         description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
         "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes by "
         "name, linearise.json and report.md; several speeds or heights make a scheduled model. With --inflow freewake: "
-        "flap, lag and all states of the wake in hover, over level ground or none, seen from the hub as a "
-        "time-invariant model; wakes grow, and the reduced model says for which horizon it is. Several heights go to "
-        "folders of their own. Without a thrust: the free wake of rigid blades at a collective, in hover. Exit code 1 "
-        "where a trim or the wake did not converge.",
+        "flap, lag and all states of the wake, over level ground or none; in flight periodic, condensed to a hundred "
+        "states; in hover, seen from the hub, a time-invariant model whose wake grows, and the reduced model says for "
+        "which horizon it is, several heights in folders of their own. Without a thrust: the free wake of rigid blades "
+        "at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
     )
     add = parser.add_argument
     add_rotor(parser)
@@ -53,7 +53,8 @@ def run(chosen: argparse.Namespace) -> int:
     trimmed = chosen.thrust_coefficient is not None or chosen.weight is not None
     if not trimmed:
         return _wake(chosen)
-    return _hovers(chosen) if chosen.inflow == "freewake" else _flights(chosen)
+    flies = any(speed for speed in [*(chosen.advance_ratio or []), *(chosen.speed or [])])
+    return _hovers(chosen) if chosen.inflow == "freewake" and not flies else _flights(chosen)
 
 
 def _flights(chosen: argparse.Namespace) -> int:
@@ -62,7 +63,8 @@ def _flights(chosen: argparse.Namespace) -> int:
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, flight_output, schedule
 
-    _refuse(chosen, {"quick": False, "collective": None}, "belongs to a free wake, or to one of rigid blades")
+    usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
+    _refuse(chosen, usual, "belongs to a free wake, or to one of rigid blades")
     wanted, requests = _wanted(chosen), _requests(chosen)
     for request in requests:
         flight.check(request, wanted)
@@ -151,7 +153,7 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
 
     from rotorjax.commands.arguments import flown
     from rotorjax.trim.run import FREE_WAKE, request
-    from rotorjax.wake.settings import quick_settings
+    from rotorjax.wake.settings import flight_settings, quick_settings
 
     base = request(
         chosen.rotor,
@@ -163,7 +165,8 @@ def _requests(chosen: argparse.Namespace) -> "list[Request]":
     )
     base, speeds = flown(chosen, base)
     if chosen.quick and chosen.inflow == FREE_WAKE:
-        base = replace(base, wake=quick_settings(azimuths=2 * base.rotor.blades))
+        still = quick_settings(azimuths=2 * base.rotor.blades)
+        base = replace(base, wake=flight_settings(base.rotor.blades, panels=still.panels) if any(speeds) else still)
     return [replace(base, advance=mu, height=h) for h in chosen.height or [None] for mu in speeds]
 
 

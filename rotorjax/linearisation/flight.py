@@ -6,12 +6,14 @@ import numpy as np
 from jaxtyping import Float
 
 from rotorjax.coupled import Coupled
+from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import rotor, steps
 from rotorjax.linearisation.compact import Compact, check_order, compact, frequencies, gaps, kept_states
 from rotorjax.linearisation.drive import check_names, drive_of
 from rotorjax.linearisation.modes import Mode, modes
 from rotorjax.linearisation.stages import Stages
+from rotorjax.linearisation.wake_flight import InWake, all_modes, base_in_flight, linear_in_flight
 from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.hill import harmonic_transfer, present
 from rotorjax.ode.models import LinearModel, PeriodicModel
@@ -19,6 +21,8 @@ from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.trim.problem import Controls, inputs_at
 from rotorjax.trim.run import FREE_WAKE, Progress, Request, Result, prepare, run
+from rotorjax.trim.run import check as check_request
+from rotorjax.wake.settings import flight_settings
 
 CONTROLS = ("theta_0", "theta_1c", "theta_1s", "u", "v", "w", "p", "q", "r")
 """Inputs by default."""
@@ -59,6 +63,7 @@ class LinearFlight:
     modes: tuple[Mode, ...]
     step_error: Float[np.ndarray, "q m"]
     seconds: dict[str, float]
+    wake: InWake | None = None
 
 
 def check(request: Request, wanted: Wanted) -> None:
@@ -83,14 +88,20 @@ def check(request: Request, wanted: Wanted) -> None:
 
 def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
     """Rotor and inputs of a flight, its controls not yet known, and the inflow's name."""
-    if request.inflow == FREE_WAKE:
-        raise InputError(
-            "Argument `inflow` must be uniform, pitt-peters or vpbfsm here, but is 'freewake': its hover is linearised "
-            "by linearisation.hover_flight"
-        )
     tilt = request.flight.tilt
     still = Controls(0 * tilt, 0 * tilt, 0 * tilt, tilt)
-    return prepare(request)[0], inputs_at(still, request.flight), f"{request.inflow} inflow"
+    if request.inflow != FREE_WAKE:
+        return prepare(request)[0], inputs_at(still, request.flight), f"{request.inflow} inflow"
+    check_request(request)
+    if not request.advance or request.slope_deg:
+        raise InputError(
+            "Arguments must ask for a flight over level ground or none where the free wake's model is periodic "
+            f"(`advance_ratio` not 0, `slope` 0), but are {request.advance:g} and {request.slope_deg:g}: "
+            "linearisation.hover_flight has level hover"
+        )
+    settings = request.wake or flight_settings(request.rotor.blades)
+    wake = coupled_wake(request.rotor, request.operating, settings, request.ground)
+    return wake, inputs_at(still, request.flight), "a free wake"
 
 
 def linearise_flight(
@@ -109,21 +120,36 @@ def linearise_flight(
     if not result.converged:
         return result
     base = rotor.base_of(result.trimmed, wanted.azimuths)
-    periodic = rotor.linear_rotor(base, wanted.inputs, wanted.outputs)
+    if request.inflow == FREE_WAKE:
+        base = base_in_flight(base, wanted.azimuths, progress)
+        clock.done("periodic march")
+        if not base.orbit.converged:
+            return _lost(result, base.orbit.why)
+        periodic, wake = linear_in_flight(base, wanted.inputs, wanted.outputs, clock.done, progress)
+        error = wake.step_error
+    else:
+        periodic, wake = rotor.linear_rotor(base, wanted.inputs, wanted.outputs), None
+        clock.done("linearisation")
+        outs, ins = periodic.outputs, periodic.inputs
+        truth = steps.marched(base, ins, outs)
+        error = steps.largest_gap(truth, steps.modelled(periodic, [steps.size_of(name) for name in ins]))
+        clock.done("marches")
     periodic = replace(periodic, notes={**periodic.notes, **flight_notes(result)})
-    clock.done("linearisation")
-    found = modes(periodic)
+    found = modes(periodic) if wake is None else all_modes(periodic, wake)
     truth = harmonic_transfer(periodic, frequencies())[:, 0]
     held = held_harmonics(periodic, wanted.harmonics)
     full = harmonic_model(periodic, held)
     clock.done("modes")
     small = compact(full, wanted.order, truth)
     clock.done("reduction")
-    outs, ins = periodic.outputs, periodic.inputs
-    error = steps.largest_gap(steps.marched(base, ins, outs), steps.modelled(periodic, [steps.size_of(n) for n in ins]))
-    clock.done("marches")
     gap = gaps(truth, full.response(frequencies()))
-    return LinearFlight(result, periodic, held, full, *gap, small, found, error, clock.seconds)
+    return LinearFlight(result, periodic, held, full, *gap, small, found, error, clock.seconds, wake)
+
+
+def _lost(result: Result, why: str) -> Result:
+    """The trim as one that did not come to a linear model."""
+    trimmed = result.trimmed
+    return replace(result, trimmed=replace(trimmed, outcome=replace(trimmed.outcome, converged=False, why=why)))
 
 
 def held_harmonics(model: PeriodicModel, highest: int) -> tuple[int, ...]:

@@ -1,6 +1,6 @@
 """What `rotorjax linearise` leaves behind of a trimmed rotor: models, README, picture, linearise.json, report.md."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +13,11 @@ from rotorjax.bench.plotting import INK, new_figure, series_colours, style
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation import steps
 from rotorjax.linearisation.compact import HIGHEST
+from rotorjax.linearisation.condensed import TURNS
 from rotorjax.linearisation.flight import LinearFlight
 from rotorjax.linearisation.handover import Time, handed_over, save
 from rotorjax.linearisation.modes import Mode
+from rotorjax.linearisation.wake_flight import InWake
 from rotorjax.trim.run import numbers
 
 
@@ -52,7 +54,7 @@ def summary(found: LinearFlight) -> dict[str, Any]:
     def signals(names: Sequence[str], units: Sequence[str], values: np.ndarray) -> dict[str, dict[str, Any]]:
         return {n: {"unit": u, "trim": float(v)} for n, u, v in zip(names, units, values, strict=True)}
 
-    return {
+    return _wake_content(found, by_name) | {
         "trim": numbers(found.result),
         "omega_rad_s": model.notes["omega_rad_s"],
         "inputs": signals(model.inputs, model.input_units, model.u),
@@ -76,6 +78,21 @@ def summary(found: LinearFlight) -> dict[str, Any]:
     }
 
 
+def _wake_content(found: LinearFlight, by_name: Callable[[np.ndarray], dict]) -> dict[str, Any]:
+    """What there is of the model of all states in a free wake."""
+    wake = found.wake
+    if wake is None:
+        return {}
+    return {
+        "all_states": wake.states,
+        "all_states_azimuths": wake.azimuths,
+        "all_states_modes": [mode_content(mode) for mode in wake.modes],
+        "all_states_residual": wake.residual,
+        "condensed_error": by_name(wake.condensed_error),
+        "march_CT": None if np.isnan(wake.thrust) else wake.thrust,
+    }
+
+
 def mode_content(mode: Mode) -> dict[str, Any]:
     """A mode as linearise.json has it."""
     return {
@@ -91,6 +108,7 @@ def mode_content(mode: Mode) -> dict[str, Any]:
 def report(found: LinearFlight, title: str) -> str:
     """The report in Markdown."""
     model, small = found.periodic, found.small
+    wake = "" if found.wake is None else _wake_report(found.wake)
     held = "its mean over a revolution" if len(found.held) == 1 else f"its harmonics {found.held}"
     if model.t.size == 1:
         held = "it does not change with the azimuth, seen from the hub"
@@ -117,7 +135,9 @@ def report(found: LinearFlight, title: str) -> str:
         f"# Linear model: {title}\n\n"
         f"{model.order} states over {model.t.size} azimuths; time-invariant with {found.full.order} states ({held}); "
         f"reduced to {small.model.order}, the blades' states as they are. Growth and frequency below are per radian of "
-        "azimuth (1 is once per revolution), as seen from the hub.\n\n## Modes\n\n"
+        "azimuth (1 is once per revolution), as seen from the hub.\n\n"
+        + wake
+        + "## Modes\n\n"
         + table(("mode", "growth", "frequency", "damping ratio", "who takes part"), rows)
         + "\n\n![Roots](roots.png)\n\n## Errors\n\n"
         f"Largest differences up to {HIGHEST:g}/rev from the periodic model's response at the input's own frequency, "
@@ -125,6 +145,24 @@ def report(found: LinearFlight, title: str) -> str:
         f"revolution after a step ({sizes}), over the response's largest value or {steps.FLOOR:g} of the output's.\n\n"
         + table(("response", "full, dB", "full, deg", "reduced, dB", "reduced, deg", "step, %"), pairs)
         + f"\n\n## Time\n\n{times}\n"
+    )
+
+
+def _wake_report(wake: InWake) -> str:
+    """What a reader should know of the model of all states."""
+    rows = [
+        (m.name, m.exponent.real, m.exponent.imag, ", ".join(f"{k} {v:.2f}" for k, v in m.shares.items()))
+        for m in wake.modes
+    ]
+    thrust = "" if np.isnan(wake.thrust) else f" (C_T = {wake.thrust:.5f})"
+    middle, most = 100 * np.median(wake.condensed_error), 100 * wake.condensed_error.max()
+    return (
+        f"## In the free wake\n\nThe equations that are marched have {wake.states} states here. They were linearised "
+        f"at {wake.azimuths} azimuths about the periodic march next to the trim{thrust}, and condensed to the periodic "
+        f"model by what inputs reach and outputs show in {TURNS:g} revolutions: its steps differ over a revolution by "
+        f"{middle:.2g} % in the median of all responses and {most:.2g} % at most. Differences from the nonlinear march "
+        f"below are those of all {wake.states} states, and so are these leading exponents, named by whose share in "
+        "them is largest:\n\n" + table(("mode", "growth", "frequency", "share"), rows) + "\n\n"
     )
 
 
@@ -158,5 +196,11 @@ def lines(found: LinearFlight) -> str:
         f"linear against nonlinear over a revolution: median {100 * np.median(found.step_error):.2g} %, worst "
         f"{100 * np.max(found.step_error):.2g} %",
     ]
+    if found.wake is not None:
+        error = found.wake.condensed_error
+        text.append(
+            f"{found.wake.states} states in the free wake, condensed to {found.periodic.order}: a step's error over a "
+            f"revolution {100 * np.median(error):.2g} % in the median, worst {100 * error.max():.2g} %"
+        )
     text += [f"  {m.name:<24} {m.exponent.real:+.4f} {m.exponent.imag:+.4f}i per radian" for m in found.modes]
     return "\n".join(text)

@@ -65,7 +65,7 @@ def readme(models: dict[str, LinearModel | PeriodicModel], title: str) -> str:
 
 FILES = {
     "reduced": "time-invariant, the blades' states kept, the inflow small",
-    "full": "time-invariant, every state that the inputs reach",
+    "full": "time-invariant, every state that the inputs reach (in a free wake in flight those it is condensed to)",
     "periodic": "A(t) … D(t) over one revolution, their last axis in MATLAB, their first in NetCDF",
 }
 """What each file holds."""

@@ -27,7 +27,7 @@ from rotorjax.ode.orbit import require_converged
 from rotorjax.rotor import multiblade
 from rotorjax.wake.search import Progress
 
-CHUNK = 64
+CHUNK = 32
 """Columns of a pass."""
 NOTHING = 1e-9
 """Share of the largest entry of B below which it is rounding."""
@@ -175,18 +175,12 @@ def hover_model(
         names=tuple(names[k].replace("_0", "_{}", 1) for k in members[0]),
         units=tuple(units[k] for k in members[0]),
         inputs=tuple(inputs),
-        outputs=_expanded(outputs, stations(base.p).size),
+        outputs=readings.expanded(outputs, stations(base.p).size),
         u=np.array([float(base.u[name]) for name in inputs]),
         y=value,
         x={name: flat[k] for name, k in zip(order, members, strict=True)},
         notes=rotor.notes(base),
     )
-
-
-def _expanded(outputs: Sequence[str], count: int) -> tuple[str, ...]:
-    """Names of single outputs: section loads have one for every station."""
-    several = {name: [f"{name}[{i}]" for i in range(count)] for name in outputs if name.startswith(readings.LIFT)}
-    return tuple(one for name in outputs for one in several.get(name, [name]))
 
 
 def _check(base: Base, inputs: Sequence[str], outputs: Sequence[str]) -> None:
@@ -236,16 +230,23 @@ def _derivatives(
     function, start = Flat(base.orbit.start, inputs, outputs), base.orbit.t[0]
     along = np.zeros((len(first) + len(inputs), z.size))
     along[: len(first), : x.size], along[len(first) :, x.size :] = first, np.eye(len(inputs))
+    found = products(function, z, start, base.u, base.p, along, progress)
+    value, rows = pulled(function, z, start, base.u, base.p)
+    return np.asarray(value), found[: len(first), : x.size], found[len(first) :], np.asarray(rows)[:, : x.size]
+
+
+def products(
+    function: "Flat", z: Array, psi: Array, u, p, along: Float[np.ndarray, "k N"], progress: Progress | None = None
+) -> Float[np.ndarray, "k M"]:
+    """Rates and outputs along directions, CHUNK at a time by one program."""
     passes = []
     for k in range(0, len(along), CHUNK):
         chunk = np.zeros((CHUNK, z.size))
         chunk[: len(along[k : k + CHUNK])] = along[k : k + CHUNK]
-        passes.append(np.asarray(pushed(function, z, start, base.u, base.p, jnp.asarray(chunk))))
+        passes.append(np.asarray(pushed(function, z, psi, u, p, jnp.asarray(chunk))))
         if progress is not None:
             progress(f"linearisation {min(k + CHUNK, len(along)) / len(along):.0%}", 0.0)
-    found = np.concatenate(passes)[: len(along)]
-    value, rows = _pulled(function, z, start, base.u, base.p)
-    return np.asarray(value), found[: len(first), : x.size], found[len(first) :], np.asarray(rows)[:, : x.size]
+    return np.concatenate(passes)[: len(along)]
 
 
 class Flat(eqx.Module):
@@ -275,7 +276,7 @@ def pushed(function: Flat, z: Array, psi: Array, u, p, along: Float[Array, "k N"
 
 
 @eqx.filter_jit
-def _pulled(function: Flat, z: Array, psi: Array, u, p) -> tuple[Float[Array, " q"], Float[Array, "q N"]]:
+def pulled(function: Flat, z: Array, psi: Array, u, p) -> tuple[Float[Array, " q"], Float[Array, "q N"]]:
     """Outputs and their derivatives by everything, row by row."""
     value, back = jax.vjp(lambda z: function(z, psi, u, p)[1], z)
     return value, jax.lax.map(lambda row: back(row)[0], jnp.eye(value.size))

@@ -12,7 +12,7 @@ from rotorjax.linearisation.drive import check_names, drive_of
 from rotorjax.linearisation.flight import Wanted, flight_notes
 from rotorjax.linearisation.hover import HoverModel, Wave, hover_model
 from rotorjax.linearisation.hover_small import SmallHover, small_hover
-from rotorjax.linearisation.modes import Mode, blade_modes, named
+from rotorjax.linearisation.modes import Mode, blade_modes, named, numbered
 from rotorjax.linearisation.stages import Stages
 from rotorjax.ode.hill import Exponents
 from rotorjax.ode.threads import one_thread
@@ -48,8 +48,8 @@ def check(request: Request, wanted: Wanted) -> None:
     for name, value in (("advance_ratio", request.advance), ("tilt", request.tilt_deg), ("slope", request.slope_deg)):
         if value:
             raise InputError(
-                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is {value:g}: take "
-                "pitt-peters or vpbfsm there"
+                f"Argument `{name}` must be 0 for a time-invariant model in the free wake, but is {value:g}: "
+                "linearisation.flight has level flight, pitt-peters and vpbfsm the rest"
             )
     blades = request.rotor.blades
     if blades < 3:
@@ -104,23 +104,13 @@ def hover_modes(model: HoverModel, leading: int = LEADING) -> tuple[tuple[Mode, 
     found.sort(key=lambda mode: -mode.exponent.real)
     wakes = [mode for mode in found if mode.name.startswith(WAKE)][:leading]
     kept = [mode for mode in found if not mode.name.startswith(WAKE) or mode in wakes]
-    return tuple(_numbered(kept)), unstable
+    return tuple(numbered(kept)), unstable
 
 
 def _of_wake(mode: Mode, wave: Wave) -> Mode:
     """A mode of the wake by its wave number: what goes round as a whole, once … or from blade to blade."""
     kind = {"0": "collective", "D": "differential"}.get(wave.coordinates[0], f"cyclic {wave.coordinates[0][:-1]}")
     return replace(mode, name=f"{WAKE} {kind}") if mode.name.startswith("inflow") else mode
-
-
-def _numbered(found: list[Mode]) -> list[Mode]:
-    """Modes with names that occur once each."""
-    counts: dict[str, int] = {}
-    for k, mode in enumerate(found):
-        counts[mode.name] = counts.get(mode.name, 0) + 1
-        if counts[mode.name] > 1:
-            found[k] = replace(mode, name=f"{mode.name} ({counts[mode.name]})")
-    return found
 
 
 @one_thread

@@ -1,7 +1,7 @@
 """Modes of a linear rotor by name: coning, regressing and progressing flap and lag, inflow; who takes part in each."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def named(found: Exponents, states: tuple[str, ...], known: Mapping[int, str] | 
     where the largest share is not to decide.
     """
     shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
-    families = [_family(state) for state in states]
+    families = [family_of(state) for state in states]
     chosen = []
     for k in shown:
         part = found.participation[:, k]
@@ -61,6 +61,16 @@ def named(found: Exponents, states: tuple[str, ...], known: Mapping[int, str] | 
     )
 
 
+def numbered(found: Sequence[Mode]) -> list[Mode]:
+    """Modes with names that occur once each."""
+    counts: dict[str, int] = {}
+    told = []
+    for mode in found:
+        counts[mode.name] = counts.get(mode.name, 0) + 1
+        told.append(mode if counts[mode.name] == 1 else replace(mode, name=f"{mode.name} ({counts[mode.name]})"))
+    return told
+
+
 def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, str]:
     """Which exponents are the blades', by family: as many as it has states, those in which it takes part most.
 
@@ -68,7 +78,7 @@ def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, str]:
     """
     known: dict[int, str] = {}
     for family in FAMILIES.values():
-        inside = np.array([_family(state) == family for state in states])
+        inside = np.array([family_of(state) == family for state in states])
         share, left = found.participation[inside].sum(axis=0), int(inside.sum())
         for k in (int(k) for k in np.argsort(-share) if np.imag(found.values[k]) >= 0):
             if left <= 0:
@@ -79,7 +89,8 @@ def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, str]:
     return known
 
 
-def _family(state: str) -> str:
+def family_of(state: str) -> str:
+    """Family of a state by its name."""
     return FAMILIES.get(state.partition("_")[0], "inflow")
 
 

@@ -3,6 +3,8 @@
 Body axes: x forward, y to starboard, z down; of a rotor that turns clockwise port takes starboard's place.
 """
 
+from collections.abc import Sequence
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -32,6 +34,12 @@ SIDES = {"aft": 0.0, "starboard": np.pi / 2, "forward": np.pi, "port": 1.5 * np.
 def unit_of(name: str) -> str:
     """Unit of an output or of a rotor state."""
     return UNITS.get(name.partition("_")[0], "-")
+
+
+def expanded(outputs: Sequence[str], count: int) -> tuple[str, ...]:
+    """Names of single outputs: section loads have one for every of `count` stations."""
+    several = {name: [f"{name}[{i}]" for i in range(count)] for name in outputs if name.startswith(LIFT)}
+    return tuple(one for name in outputs for one in several.get(name, [name]))
 
 
 def readings(psi: Array, x: CoupledState, out: Outputs, u: RotorInputs, p: Coupled) -> dict[str, Array]:

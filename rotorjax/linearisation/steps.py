@@ -1,7 +1,6 @@
 """Steps of a rotor's inputs marched with the nonlinear equations, and by its linear model: what one is worth."""
 
 from collections.abc import Sequence
-from functools import partial
 
 import equinox as eqx
 import jax
@@ -29,19 +28,22 @@ ROUNDING = 1e-9
 
 @eqx.filter_jit
 def _read(times, states, u, p):
-    return jax.vmap(partial(outputs, u=u, p=p))(times, states)
+    return jax.lax.map(lambda at: outputs(at[0], at[1], u, p), (times, states))
 
 
-def marched(base: Base, names: Sequence[str], chosen: Sequence[str]) -> Float[np.ndarray, "N q m"]:
+def marched(
+    base: Base, names: Sequence[str], chosen: Sequence[str], samples: int = SAMPLES, each: int = STEPS
+) -> Float[np.ndarray, "N q m"]:
     """Deviation of the chosen outputs over a revolution after a step of each input (SIZES) at ψ = 0, from the march
-    without one. Raises InputError where a march leaves the finite numbers.
+    without one; `each` steps from one of the samples to the next. Raises InputError where a march leaves the finite
+    numbers.
     """
     start = jax.tree.map(lambda leaf: leaf[0], base.orbit.x)
     columns: list[int] = []
 
     def responses(u) -> np.ndarray:
-        step = 2 * np.pi / (SAMPLES * STEPS)
-        path = march(rates, start, 0.0, step, SAMPLES * STEPS, u, base.p, save_every=STEPS, progress=False)
+        step = 2 * np.pi / (samples * each)
+        path = march(rates, start, 0.0, step, samples * each, u, base.p, save_every=each, progress=False)
         if not path.finished:
             raise InputError(f"Argument `about` must be a trim that can be marched, but the march is {path.why}")
         read = _read(path.t, path.x, u, base.p)

@@ -20,7 +20,7 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake import kernel_sweeps
 from rotorjax.wake.field import self_induction
 from rotorjax.wake.kernel_pairs import cross, pairs, slopes
-from rotorjax.wake.model import FreeWake, WakeState, along_blade
+from rotorjax.wake.model import FreeWake, WakeState, along_blade, azimuths, slices
 from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
 
 
@@ -92,9 +92,97 @@ def velocity_response(model: FreeWake, state: WakeState, phase: Float[Array, ""]
     lattice = jax.tree.map(lambda a: a[..., near[1]], segments)
     sharper = _sharpened(places, lattice, model.settings.control_core)
     by_segments = jax.tree.map(lambda whole, own: whole.at[near].add(own), by_segments, sharper)
-    whole = _chain(by_segments, everything, flat) + jnp.einsum("nij,njm->nim", at_targets, moved)
+    parts = jax.tree.map(lambda d: jnp.concatenate([jnp.real(d), jnp.imag(d)]), by_segments)
+    real, imaginary = jnp.split(_chain(parts, everything, flat), 2)
+    whole = real + 1j * imaginary + jnp.einsum("nij,njm->nim", at_targets, moved)
     bend = jax.jacfwd(lambda v: self_induction(model, unravel(v)))(flat).reshape(-1, 3, flat.size)
     return whole.at[len(targets) - len(bend) :].add(bend)
+
+
+@eqx.filter_jit
+def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -> Float[Array, "B N 3 B n"]:
+    """Derivative of each blade's velocities, in its frame, by the wake states of all blades at one instant.
+
+    state: K = B slices, blade 0 at psi. n runs over a slice's state as `ravel_pytree` lays it out, N over control
+    points, near and far nodes; hub and blades stand still.
+    """
+    angles, numbers = azimuths(state, psi), jnp.arange(slices(state))
+    unravel = ravel_pytree(jax.tree.map(lambda a: a[0], state))[1]
+    flat = jax.vmap(lambda s: ravel_pytree(s)[0])(state)
+
+    def nodes(v, k, angle):
+        s = unravel(v)
+        own = jnp.concatenate([model.of_slice(k).control, s.near.reshape(-1, 3), s.far.reshape(-1, 3)])
+        return rotate_about_shaft(own, angle)
+
+    def everything(v, k, angle):
+        own, s = model.of_slice(k), unravel(v)
+        far = far_filaments(own, s, releases(own, s), angle)
+        whole = join(near_lattice(own, s, model.settings.near_core), far, bound_vortex(own, s.gamma_bound))
+        start, end = (rotate_about_shaft(ends, angle) for ends in (whole.start, whole.end))
+        return _kernel_form(whole._replace(start=start, end=end))
+
+    targets, segments = jax.vmap(nodes)(flat, numbers, angles), jax.vmap(everything)(flat, numbers, angles)
+    moved = jax.vmap(jax.jacfwd(nodes))(flat, numbers, angles)
+
+    def at_blade(one):
+        k, angle = one
+        own = _of_all(model, targets[k], flat, everything, k, angles)
+        own = own.at[:, :, k].add(jnp.einsum("nij,njm->nim", _by_place(model, targets[k], segments), moved[k]))
+        own = jnp.einsum("ij,njbm->nibm", rotate_about_shaft(jnp.eye(3), angle), own)  # back into the blade's frame
+        bend = jax.jacfwd(lambda v: self_induction(model.of_slice(k), unravel(v)))(flat[k]).reshape(
+            -1, 3, flat.shape[1]
+        )
+        return own.at[len(own) - len(bend) :, :, k].add(bend)
+
+    return jax.lax.map(at_blade, (numbers, angles))
+
+
+def _seen(model: FreeWake, points: Float[Array, "N 3"]) -> list[tuple[Array, Array]]:
+    """Points and, over ground, their mirror points; with the matrix that brings a velocity there back."""
+    if model.ground is None:
+        return [(points, jnp.eye(3))]
+    mirror = model.ground.reflect_vectors(jnp.eye(3)).T
+    return [(points, jnp.eye(3)), (model.ground.reflect_points(points), mirror)]
+
+
+def _by_place(model: FreeWake, points: Float[Array, "N 3"], segments: kernel_sweeps.Segments) -> Float[Array, "N 3 3"]:
+    """Derivative of the velocity at points by their own places, of all blades' segments."""
+
+    def add(total, of_blade):
+        for place, back in _seen(model, points):
+            found = pair_derivatives(place, of_blade)
+            total = total - jnp.einsum("ij,njk,kl->nil", back, jnp.sum(found.start + found.end, axis=1), back)
+        return total, None
+
+    return jax.lax.scan(add, jnp.zeros((len(points), 3, 3)), segments)[0]
+
+
+def _of_all(
+    model: FreeWake, points: Float[Array, "N 3"], flat: Float[Array, "B n"], everything: Callable, k, angles
+) -> Float[Array, "N 3 B n"]:
+    """Derivative of the velocity at blade k's points by every blade's state, through its segments."""
+    near, control = lattice_segments(model), len(model.stations)
+
+    def of_blade(one):
+        number, own, angle = one
+        sources = everything(own, number, angle)
+        found = [
+            jax.tree.map(
+                lambda d, back=back: jnp.einsum("ij,nsj...->nsi...", back, d), pair_derivatives(place, sources)
+            )
+            for place, back in _seen(model, points)
+        ]
+        whole = jax.tree.map(lambda *parts: sum(parts), *found)
+        lattice = jax.tree.map(lambda a: a[..., :near], sources)
+        sharper = _sharpened(points[:control], lattice, model.settings.control_core)
+        whole = jax.tree.map(
+            lambda all_, own: all_.at[:control, :near].add(jnp.where(number == k, own, 0.0)), whole, sharper
+        )
+        return _chain(whole, lambda v: everything(v, number, angle), own)
+
+    found = jax.lax.map(of_blade, (jnp.arange(len(flat)), flat, angles))
+    return jnp.moveaxis(found, 0, 2)
 
 
 def _sharpened(points: Float[Array, "N 3"], lattice: kernel_sweeps.Segments, fine: Float[Array, ""]) -> PairDerivatives:
@@ -153,7 +241,5 @@ def _chain(by_segments: PairDerivatives, of_state: Callable, flat: Float[Array, 
 
     # one row for each point and component: segments stand last but one, or last
     rows = [jnp.swapaxes(d, 1, 2) for d in by_segments]
-    rows = [d.reshape(-1, *d.shape[2:]) for d in rows]
-    parts = [jnp.concatenate([jnp.real(d), jnp.imag(d)]) for d in rows]
-    real, imaginary = jax.vmap(row)(*parts).reshape(2, -1, 3, flat.size)
-    return real + 1j * imaginary
+    found = jax.vmap(row)(*(d.reshape(-1, *d.shape[2:]) for d in rows))
+    return found.reshape(-1, 3, flat.size)

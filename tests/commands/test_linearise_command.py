@@ -98,7 +98,8 @@ BAD = {
     "--inflow vpbfsm": "`thrust_coefficient` or `weight` must be given",
     "--height 1 2": "`height` must be one",
     "--thrust-coefficient 0.005": "`quick` must be left out",
-    "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1": "`advance_ratio` must be 0 for a",
+    "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1 --inputs slope": "has 'slope'",
+    "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1 0": "`advance_ratio` not 0",
     "--thrust-coefficient 0.005 --inflow freewake --azimuths 24": "`azimuths` must be left out",
 }
 

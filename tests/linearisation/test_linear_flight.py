@@ -1,0 +1,152 @@
+"""The rotor in its free wake in flight: put together against forward mode, against the march, against dense ones."""
+
+from dataclasses import replace
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+from wakes import COARSE
+
+from rotorjax.coupled import RotorState
+from rotorjax.coupled_wake import coupled_wake
+from rotorjax.errors import InputError
+from rotorjax.linearisation import flight, wake_flight
+from rotorjax.linearisation.condensed import condensed
+from rotorjax.linearisation.drive import drive_of
+from rotorjax.linearisation.hover import Flat, products
+from rotorjax.linearisation.instant import instant
+from rotorjax.linearisation.rotor import Base, SteadyState
+from rotorjax.linearisation.settled import Passage, mirrored, settled
+from rotorjax.ode.orbit import make_orbit
+from rotorjax.ode.outcome import Outcome
+from rotorjax.ode.repeated import leading
+from rotorjax.rotor.hub import rotor_inputs
+from rotorjax.simulation.march import marching
+from rotorjax.trim.run import request
+from rotorjax.wake.equilibrium import full_state, spread
+from rotorjax.wake.model import free_wake
+from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.start import prescribed
+
+INPUTS, OUTPUTS = ("theta_0", "theta_1c", "q", "w"), ("CT", "M", "beta_1s", "lambda_1c", "lift_0")
+TINY = {**COARSE, "panels": 4, "closure_turns": 0, "closure_bundles": 0, "age_step_deg": 30.0, "near_wake_deg": 120.0}
+THICK = {
+    "free_turns": 4 / 12,
+    "inboard": (0.45,),
+    "tip_core": 0.1,
+    "near_core": 0.1,
+    "control_core": 0.05,
+    "circulation_lag": 0.4,
+}
+
+
+@pytest.fixture(scope="module")
+def base(uh60):
+    """A periodic march in a wind, found from a prescribed wake that knows of none."""
+    settings = wake_settings(**TINY | THICK)
+    still = free_wake(*uh60, None, settings)
+    own = full_state(still, spread(prescribed(still, 0.05), 1))[0]
+    p, zero = marching(coupled_wake(*uh60, settings)), jnp.zeros(4)
+    wake = jax.tree.map(lambda v: jnp.concatenate([v, jnp.zeros((3, *v.shape[1:]))]), own)
+    x = SteadyState(RotorState(zero.at[0].set(0.05), zero, zero.at[0].set(0.03), zero), wake)
+    u = drive_of(rotor_inputs(theta_0=0.25, theta_1c=0.03, theta_1s=-0.06, u=0.2), p)
+    start = Outcome(None, 0.0, (0.0,), 0, True, "made up", 0.0)
+    orbit = make_orbit(0.0, jax.tree.map(lambda v: v[None], x), np.pi / 2, start)
+    found = settled(Base(p, u, orbit, "a free wake"), wake_flight.passage_azimuths(p, 48))
+    assert found.orbit.converged, found.orbit.why
+    return found
+
+
+@pytest.fixture(scope="module")
+def model(base):
+    return wake_flight.all_states(base, INPUTS, OUTPUTS)
+
+
+def test_matrices_are_those_of_forward_mode(base):
+    """At an azimuth of its own, along a random direction of all states and inputs."""
+    rng, psi, x = np.random.default_rng(0), base.orbit.t[0] + 0.3, base.orbit.start
+    found = instant(psi, x, base.u, base.p, INPUTS, OUTPUTS)
+    z = jnp.concatenate([ravel_pytree(x)[0], jnp.stack([base.u[name] for name in INPUTS])])
+    n, along = found.a.shape[0], rng.normal(size=(1, z.size))
+    truth = products(Flat(x, INPUTS, OUTPUTS), z, psi, base.u, base.p, along)[0]
+    v, w = along[0, :n], along[0, n:]
+    np.testing.assert_allclose(found.a @ v + found.b @ w, truth[:n], atol=1e-11 * np.abs(truth[:n]).max())
+    np.testing.assert_allclose(found.c @ v + found.d @ w, truth[n:], atol=1e-11 * np.abs(truth[n:]).max())
+
+
+def test_steps_and_starts_march_as_the_nonlinear_equations_do(base, model):
+    """Differences of marches over a passage, from a step of collective and from another start."""
+    path, size, rng = eqx.filter_jit(partial(Passage.path, Passage(base.orbit.nodes))), 1e-5, np.random.default_rng(1)
+    flat, unravel = ravel_pytree(base.orbit.start)
+
+    def end(x, u):
+        return np.asarray(ravel_pytree(mirrored(jax.tree.map(lambda v: v[-1], path(x, u, base.p)), 4))[0])
+
+    rest = end(base.orbit.start, base.u)
+    np.testing.assert_allclose(rest, flat, atol=1e-5)
+    stepped = end(base.orbit.start, base.u | {"theta_0": base.u["theta_0"] + size}) - rest
+    way = rng.normal(size=flat.size)
+    moved = end(unravel(flat + size * way), base.u) - rest
+    x, held = np.zeros((flat.size, 1)), np.eye(len(INPUTS))[:, :1]
+    for k in range(model.steps):
+        x = model.leap(k, x, held)
+    for linear, truth in ((model.signs * x[:, 0], stepped), (model.across(way[:, None])[:, 0], moved)):
+        assert np.abs(size * linear - truth).max() < 0.03 * np.abs(truth).max()
+
+
+def test_leading_exponents_are_those_of_the_dense_monodromy_matrix(model):
+    model = model.halved()
+    matrix = model.across(np.eye(model.part.order))
+    some = np.eye(len(matrix))[:, ::40]
+    np.testing.assert_allclose(model.across_back(some), matrix[::40].T, atol=1e-12 * np.abs(matrix).max())
+    found, values = leading(model, 8, depth=20), np.linalg.eigvals(matrix)
+    largest = values[np.argsort(-np.abs(values))][: found.values.size]
+    np.testing.assert_allclose(np.sort(np.abs(found.multipliers)), np.sort(np.abs(largest)), rtol=1e-4)
+    assert found.residuals.max() < 1e-3
+    np.testing.assert_allclose(
+        np.exp(found.values * np.pi), found.multipliers**2, rtol=1e-9
+    )  # signs are back after two
+    modes = {mode.name: mode for mode in wake_flight.wake_modes(found, model.part.states)}
+    assert {"collective lag", "regressing lag", "progressing lag", "differential lag"} <= set(modes)
+    assert modes["regressing lag"].exponent.imag == pytest.approx(1 - modes["collective lag"].exponent.imag, abs=0.02)
+    assert modes["collective lag"].shares["lag"] == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_condensed_model_keeps_the_blades_and_the_steps(model):
+    truth = model.step(4)
+    errors = []
+    for states in (20, 60):
+        small = condensed(model, 4, np.abs(truth).max(axis=0), states)
+        assert small.order == 16 + states
+        assert small.states[:2] == ("beta_0", "beta_1c")
+        own = np.stack([small.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
+        errors.append(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0))
+    assert np.median(errors[1]) < min(0.015, 0.5 * np.median(errors[0]))
+
+
+BAD = {
+    "`advance_ratio` not 0": ({}, {}),
+    "has 'gust_aft'": ({"advance": 0.15}, {"inputs": ("gust_aft",)}),
+    "has 'clearance_aft'": ({"advance": 0.15}, {"outputs": ("clearance_aft",)}),
+    "`order` must be at least 13": ({"advance": 0.15}, {"order": 12}),
+    "`harmonics` must lie in": ({"advance": 0.15}, {"harmonics": 12}),
+}
+
+
+@pytest.mark.parametrize("message", BAD)
+def test_bad_input_is_refused_before_the_trim(message):
+    asked, wanted = BAD[message]
+    with pytest.raises(InputError, match=message):
+        flight.check(request("uh60", 0.00575, "freewake", **asked), flight.Wanted(**wanted))
+
+
+def test_a_failed_trim_is_refused_and_a_lost_march_told(base):
+    failed = base._replace(orbit=replace(base.orbit, converged=False, why="lost"))
+    with pytest.raises(InputError, match="lost"):
+        wake_flight.base_in_flight(failed, 48)
+    with pytest.raises(InputError, match="lost"):
+        wake_flight.all_states(failed, INPUTS, OUTPUTS)
