@@ -1,4 +1,6 @@
-"""The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py."""
+"""The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py, an axisymmetric
+wake by Anderson's iteration first.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

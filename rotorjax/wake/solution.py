@@ -1,9 +1,8 @@
 """Solving for the periodic wake, from nothing or from a neighbouring case, and what is read off it.
 
-`solve` does its own continuation. From a prescribed wake it starts in an auxiliary axial flow that carries the wake
-away, at a collective raised by the same inflow angle so that the loading stays, and takes that flow back to zero. The
-ground then rises from far below, and tilts. From a solved case it moves height and slope from there to here.
-Each step is a few Newton–Krylov iterations on the residual of equilibrium.py.
+`solve` does its own continuation. From a prescribed wake over level ground or none it goes to the case by Anderson's
+iteration and Newton's; where that is lost, by way of a distant ground or an auxiliary flow. The ground then tilts. From
+a solved case it moves height and slope from there to here (search.py).
 """
 
 from dataclasses import dataclass, replace

@@ -13,11 +13,11 @@ import xarray as xr
 from made_up_points import SPEEDS, deadly, made_up, picky, swept
 
 from rotorjax.cli import main
-from rotorjax.errors import InputError
+from rotorjax.errors import ArgumentError, InputError
 from rotorjax.io import netcdf
 from rotorjax.sweep.case import sweep_case
 from rotorjax.sweep.found import Found, Start, from_best, judged
-from rotorjax.sweep.pools import Cluster, Processes
+from rotorjax.sweep.pools import Cluster, Processes, packed, unpacked
 
 TESTS = Path(__file__).parents[1]
 
@@ -195,3 +195,10 @@ def test_without_dask_it_is_one_line(tmp_path, monkeypatch, capsys):
     assert main(line) == 2
     assert "rotorjax[cluster]" in capsys.readouterr().err
     assert main([*line[:-2], "--jobs", "0"]) == 2
+
+
+def test_an_arguments_error_comes_back_from_another_process_as_it_was():
+    met = ArgumentError("height", "be positive", "-1")
+    with pytest.raises(ArgumentError, match="Argument `height` must be positive, but is -1") as raised:
+        unpacked(packed(met))
+    assert str(raised.value.under("Key `h` of case.toml")) == "Key `h` of case.toml must be positive, but is -1"
