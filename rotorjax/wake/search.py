@@ -1,5 +1,6 @@
-"""The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py, an axisymmetric
-wake by Anderson's iteration first.
+"""The way to a periodic wake: each step a few Newton-Krylov iterations on the residual of equilibrium.py.
+
+An axisymmetric wake is first brought near by Anderson's iteration.
 """
 
 from collections.abc import Callable
