@@ -1,8 +1,8 @@
 """Watches for miscompiled code: the reason of the jax pin in pyproject.toml.
 
 jax 0.10.2 on a CPU makes the jitted `vmap(sum((M @ row)**2))` 0.8 % wrong at 16 385 float64 rows and right below (jax
-issue 39103); 0.11.2 computes wrong with 512-bit registers, which a march asked for (canary.py `wide`). The tests compile
-with less care than users do (conftest.py), so this is asked in processes of its own.
+issue 39103); 0.11.2 computes wrong with 512-bit registers, which a march asked for (canary.py `wide`). The tests
+compile with less care than users do (conftest.py), so this is asked in processes of its own.
 """
 
 import os

@@ -66,10 +66,9 @@ class Search:
         self.ok, self.why = found.converged, found.why
         if found.converged or found.interrupted:
             return model, found.x
-        far = over_distant_ground(model)
-        if model.ground is None or far.ground.height == model.ground.height:
+        if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)
-        here, x = self.from_nothing(far)
+        here, x = self.from_nothing(on_host(eqx.tree_at(lambda m: m.ground.height, model, np.asarray(DISTANT))))
         return self.move(here, model, x, "nearer to the ground") if self.ok else (here, x)
 
     def by_way_of_washout(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
@@ -167,14 +166,6 @@ def level(model: FreeWake) -> FreeWake:
     if model.ground is None:
         return on_host(model)
     return on_host(eqx.tree_at(lambda m: m.ground.slope, model, np.zeros_like(model.ground.slope)))
-
-
-def over_distant_ground(model: FreeWake) -> FreeWake:
-    """The model with its ground, if any, so far down that a prescribed wake is a good guess."""
-    if model.ground is None:
-        return on_host(model)
-    height = np.maximum(DISTANT, np.asarray(model.ground.height))
-    return on_host(eqx.tree_at(lambda m: m.ground.height, model, height))
 
 
 def with_washout(model: FreeWake, washout: float) -> FreeWake:
