@@ -37,7 +37,7 @@ from rotorjax.trim.run import Result
 
 WIDE = {"xla_cpu_prefer_vector_width": 512} if jax.__version_info__ < (0, 11) else None
 """For XLA's CPU back end: registers as wide as the machine has; a quarter off the sums' time where it has 512 bits. Not
-with jax 0.11.2, which then miscompiles (tests/canary.py `wide`): a finer wake's closure was NaN from its second call.
+with jax 0.11.2, which then miscompiles (tests/canary.py `wide`): a fine wake's closure was NaN from the second call on.
 """
 
 
