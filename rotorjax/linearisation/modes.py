@@ -113,11 +113,11 @@ def _names(found: list[tuple[str, str, complex]]) -> list[str]:
     for (family, coordinate), members in groups.items():
         slowest_first = sorted(members, key=lambda k: (abs(found[k][2].imag), -found[k][2].real))
         for place, k in enumerate(slowest_first):
-            names[k] = _name(family, coordinate, place, len(members), found[k][2].imag != 0)
+            names[k] = _name(family, coordinate, place, len(members), abs(found[k][2].imag))
     return [_counted(name, names[:k]) for k, name in enumerate(names)]
 
 
-def _name(family: str, coordinate: str, place: int, count: int, turns: bool) -> str:
+def _name(family: str, coordinate: str, place: int, count: int, frequency: float) -> str:
     if family == "inflow":
         return f"inflow {coordinate}"
     if coordinate == "0":
@@ -125,9 +125,9 @@ def _name(family: str, coordinate: str, place: int, count: int, turns: bool) -> 
     if coordinate == "D":
         return f"differential {family}"
     order = "" if coordinate == "1" else f" {coordinate}"
-    if count > 2 and not turns:
-        return f"regressing {family}{order}"
-    return f"{'progressing' if place == count - 1 and count > 1 else 'regressing'} {family}{order}"
+    # one alone, whose partner the inflow has drowned, goes by what a blade's frequency of 0 … 2 makes of both
+    last = frequency > 1 if count == 1 else place == count - 1 and (count == 2 or frequency > 0)
+    return f"{'progressing' if last else 'regressing'} {family}{order}"
 
 
 def _counted(name: str, before: list[str]) -> str:
