@@ -23,7 +23,7 @@ from rotorjax.wake.equilibrium import Unknowns, displacement, evaluated
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Search, level
-from rotorjax.wake.settings import quick_settings, wake_settings
+from rotorjax.wake.settings import hover_settings, quick_settings
 from rotorjax.wake.start import prescribed
 
 TOL, SAME = 1e-9, 1e-5
@@ -48,7 +48,7 @@ def searched(model: FreeWake, factors: np.ndarray) -> tuple[Search, FreeWake, Un
 
 def run_case(name: str, starts: int, quick: bool) -> dict:
     """All starts of one case; the first is unvaried and compiles."""
-    settings = (quick_settings if quick else wake_settings)()
+    settings = (quick_settings if quick else hover_settings)()
     model = free_wake(*load("uh60"), None if name == "hover" else plane(float(name)), settings)
     rng = np.random.default_rng(0)
     draws = np.concatenate([np.ones((1, 3)), rng.uniform(0.8, 1.2, size=(starts, 3))])
