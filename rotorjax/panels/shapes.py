@@ -13,6 +13,8 @@ from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.panels.surface import Panels
 
+Point = ArrayLike | Sequence[ArrayLike]
+
 PANEL = 0.25
 """Size over R of a panel near the shaft."""
 
@@ -20,7 +22,7 @@ STRETCH = 2.0
 """Distance over R from the shaft up to which panels keep their size; beyond they grow with it."""
 
 
-def box(low: ArrayLike, high: ArrayLike, panel: float = PANEL) -> Panels:
+def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
     """Make a box between two corners: a hangar, a superstructure, a building with its roof.
 
     low, high (3,): over R, either may be traced. panel: size near the shaft. A face that rests on the ground is left
@@ -39,7 +41,7 @@ def box(low: ArrayLike, high: ArrayLike, panel: float = PANEL) -> Panels:
     return Panels(jnp.concatenate(faces))
 
 
-def slab(low: ArrayLike, high: ArrayLike, top: ArrayLike, thickness: ArrayLike = 0.5, panel: float = PANEL) -> Panels:
+def slab(low: Point, high: Point, top: ArrayLike, thickness: ArrayLike = 0.5, panel: float = PANEL) -> Panels:
     """Make a deck or a roof, a flat box: low, high (2,) in x and y, top (z, negative under the hub) and thickness.
 
     It has a thickness because sources stop air on one side only: behind a sheet it would come out again.
@@ -68,7 +70,7 @@ def wall(
     return Panels(rotate_about_shaft(box(low, high, panel).corners, jnp.deg2rad(jnp.asarray(azimuth_deg, float))))
 
 
-def terrain(x: Sequence[float], y: Sequence[float], heights: Float[ArrayLike, "X Y"]) -> Panels:
+def terrain(x: Sequence[float], y: Sequence[float], heights: ArrayLike | Sequence[Sequence[float]]) -> Panels:
     """Make a patch of terrain: z of the surface (negative under the hub) at the nodes of a grid x, y.
 
     Each cell is two triangles. The patch is open: air comes out behind it and passes its rim. Lay the rim on the ground
@@ -80,7 +82,7 @@ def terrain(x: Sequence[float], y: Sequence[float], heights: Float[ArrayLike, "X
     (8, True)
     """
     lines = [np.asarray(v, float) for v in (x, y)]
-    z = array(heights)
+    z = array(heights)  # type: ignore[arg-type]
     for name, line in zip("xy", lines, strict=True):
         if line.ndim != 1 or len(line) < 2 or not np.all(np.diff(line) > 0):
             raise refuse(name, "be two or more rising numbers", shown(line.tolist()))
@@ -91,8 +93,8 @@ def terrain(x: Sequence[float], y: Sequence[float], heights: Float[ArrayLike, "X
     return Panels(jnp.concatenate([jnp.stack([a, b, c, c], axis=1), jnp.stack([a, c, d, d], axis=1)]))
 
 
-def _corner(name: str, value: ArrayLike, count: int = 3) -> Array:
-    found = array(value)
+def _corner(name: str, value: Point, count: int = 3) -> Array:
+    found = array(value)  # type: ignore[arg-type]
     if found.shape != (count,) or (known(found) and not np.all(np.isfinite(np.asarray(found)))):
         raise refuse(name, f"be {count} finite numbers over R", shown(value))
     return found

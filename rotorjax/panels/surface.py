@@ -9,6 +9,7 @@ the matrix inverted once. Sources stop air on the side that normals point to. Be
 out again; a closed one stops it all round, which a deck or a roof wants: give them some thickness.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import equinox as eqx
@@ -16,7 +17,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jaxtyping import Float
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import ArrayLike, Float
 
 from rotorjax.checks import array, known
 from rotorjax.errors import InputError
@@ -74,7 +76,7 @@ class Panels(eqx.Module):
         thirds = jnp.stack([self.corners[:, :3].mean(axis=1), self.corners[:, np.array([0, 2, 3])].mean(axis=1)])
         return jnp.sum(share[..., None] * thirds, axis=0)
 
-    def moved(self, by: Float[Array, "3"]) -> "Panels":
+    def moved(self, by: ArrayLike | Sequence[ArrayLike]) -> "Panels":
         """The same surface elsewhere, over R."""
         return Panels(self.corners + jnp.asarray(by, float))
 
@@ -129,13 +131,23 @@ def _solved(panels: Panels, ground: Plane | None, inverse: Array, b: Array) -> A
     return inverse @ b
 
 
-@_solved.defjvp
-def _(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
-    """A dσ = db − dA σ."""
+def _moved(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    """A dσ = db − dA σ, the last term only where panels or ground move."""
     panels, ground, inverse, _ = primals
     density = _solved(*primals)
-    moved = jax.jvp(lambda p, g: normal_flow(p, g, density), (panels, ground), (tangents[0], tangents[1]))[1]
-    return density, _solved(panels, ground, inverse, tangents[3] - moved)
+    still = [isinstance(t, SymbolicZero) for t in jax.tree.leaves(tangents[:2])]
+    moved_panels, moved_ground, _, change = jax.tree.map(_dense, tangents)
+    if not all(still):
+        both = (panels, ground), (moved_panels, moved_ground)
+        change = change - jax.jvp(lambda p, g: normal_flow(p, g, density), *both)[1]
+    return density, _solved(panels, ground, inverse, change)
+
+
+_solved.defjvp(_moved, symbolic_zeros=True)
+
+
+def _dense(tangent: Array | SymbolicZero) -> Array:
+    return jnp.zeros(tangent.shape, tangent.dtype) if isinstance(tangent, SymbolicZero) else tangent  # type: ignore[arg-type]
 
 
 def solid(surfaces: Panels, ground: Plane | None = None) -> Solid:

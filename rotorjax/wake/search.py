@@ -46,6 +46,12 @@ WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
 
 
+def share(model: FreeWake):
+    """Where a model keeps the share of its surfaces' flow that counts."""
+    assert model.surfaces is not None
+    return model.surfaces.share
+
+
 @dataclass
 class Search:
     """The way so far: whether it still goes on, why it ended, and what it took."""
@@ -98,12 +104,17 @@ class Search:
         return self.follow(between, x, stage, first, min(last, SMALLEST), first)
 
     def among(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
-        """From the wake of `model.levelled`, over K slices, to the surfaces: at once, or as their flow comes up."""
+        """From the wake of `model.levelled`, over K slices, to the surfaces: at once, or as their flow comes up.
 
-        def at(share: float) -> FreeWake:
-            return on_host(eqx.tree_at(lambda m: m.surfaces.share, model, np.asarray(share)))
-
-        return self.follow(at, x, "surfaces", 1.0)
+        Over a large deck that wake is nearly the one; beside a wall it is the one that the wall's flow is added to.
+        """
+        self.prepare(model, x)
+        found = self.newton(model, x, self.tol)
+        self.note("surfaces", found)
+        self.ok, self.why = found.converged, found.why
+        if found.converged or found.interrupted:
+            return on_host(model), found.x
+        return self.follow(lambda s: on_host(eqx.tree_at(share, model, np.asarray(s))), x, "share of surfaces", 0.5)
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""

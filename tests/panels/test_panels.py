@@ -121,19 +121,19 @@ def test_a_large_flat_patch_is_the_image():
 
 
 def test_derivative_by_the_place_of_a_wall():
-    """A fixed source beside a wall that moves: forward and reverse against differences."""
-    probe = jnp.array([[0.2, 0.1, 0.4], [-0.5, 0.3, -0.2]])
+    """A fixed source beside a wall that moves: reverse mode against differences."""
+    probe, still = jnp.array([[0.2, 0.1, 0.4], [-0.5, 0.3, -0.2]]), wall(1.2, -1.0, 1.0, 2.0, thickness=0.4, panel=0.5)
 
-    def answer(distance):
-        closed = solid(wall(distance, -1.0, 1.0, length=2.0, thickness=0.4, panel=0.5))
+    @jax.jit
+    def answer(by):
+        closed = solid(still.moved(by * jnp.array([1.0, 0, 0])))
         middles = closed.panels.middles
         square = jnp.sum(middles**2, axis=1, keepdims=True)
         through = jnp.sum(middles / square**1.5 * closed.panels.normals, axis=1) / (4 * jnp.pi)
         return jnp.sum(closed.answer(probe, through) * jnp.array([1.0, 0.3, -0.7]))
 
-    forward, reverse = jax.jvp(answer, (1.2,), (1.0,))[1], jax.grad(answer)(1.2)
-    np.testing.assert_allclose(forward, reverse, rtol=1e-10)
-    np.testing.assert_allclose(forward, (answer(1.2 + 1e-5) - answer(1.2 - 1e-5)) / 2e-5, rtol=1e-7)
+    differences = (answer(1e-5) - answer(-1e-5)) / 2e-5
+    np.testing.assert_allclose(jax.jit(jax.grad(answer))(0.0), differences, rtol=1e-7)
 
 
 def test_the_floor_of_a_rotor():
