@@ -3,7 +3,7 @@
 Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
 theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
 the edge of a roof a radius below it), hangar (one beside a wall at 1.2 R). Knight and Hefner's two-bladed rotor at 8°
-with a wake that keeps all of it to minutes: three free turns, 8 azimuths (`SETTINGS`). --quick: fewer still.
+with a wake that keeps all of it to minutes: three free turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
 """
 
 import argparse
@@ -18,27 +18,29 @@ import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, save_file, style
+from rotorjax.frames import rotate_about_shaft
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 from rotorjax.region import half_plane
 from rotorjax.wake.equilibrium import evaluate
-from rotorjax.wake.field import at_instants, wake_segments
+from rotorjax.wake.field import at_instants, velocity, wake_segments
 from rotorjax.wake.model import azimuths
 from rotorjax.wake.sensitivity import periodic_wake
 from rotorjax.wake.solution import readings
 
 jax.config.update("jax_enable_x64", True)
 
-SETTINGS = {"panels": 10, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 3.0, "azimuths": 8}
-COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0, "closure_turns": 1, "closure_bundles": 2}
+SETTINGS = {"panels": 10, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 3.0, "stretch": 1, "azimuths": 8}
+SETTINGS |= {"tip_core": 0.05}
+COARSE = SETTINGS | {"panels": 8, "free_turns": 2.0, "closure_turns": 1, "closure_bundles": 2}
 PLACES = np.linspace(-1.5, 1.5, 13)
 HEIGHT = 1.0
 
 
 def wake(surfaces=None, ground=None, quick=False):
-    settings = rj.WakeSettings(**(COARSE if quick else SETTINGS))
+    settings = rj.hover_settings(**(COARSE if quick else SETTINGS))
     return rj.free_wake(*rj.rotor("knight_hefner_2", 8.0), ground, settings, surfaces)
 
 
@@ -154,7 +156,8 @@ def cost(quick: bool) -> dict:
 
 def roof(quick: bool) -> list[dict]:
     """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive."""
-    rows, last = [], None
+    rows, last, open_air = [], None, rj.solve(wake(quick=quick))
+    alone = float(open_air.mean_inflow / jnp.sqrt(open_air.CT))
     house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.5 if quick else 0.35)
     for edge in sorted(PLACES[::2] if quick else PLACES, reverse=True):
         house = house_at_hub.moved((float(edge), 0, 0))
@@ -162,6 +165,7 @@ def roof(quick: bool) -> list[dict]:
         solved = rj.solve(wake(house, quick=quick), last)
         c_l, c_m = moments(solved)
         row = {"edge": float(edge), "CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
+        row["inflow_ratio"] = float(solved.mean_inflow / jnp.sqrt(solved.CT)) / alone
         row |= {"converged": bool(solved.converged), "why": solved.why, "left": no_flow(solved), "panels": len(house)}
         row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations}
         print(json.dumps({"roof": row}), flush=True)
@@ -189,7 +193,7 @@ def of_finite_states(thrust: float) -> np.ndarray:
 def hangar(quick: bool) -> tuple[dict, object]:
     """A rotor over ground beside a wall that stands 1.2 R to starboard; and without the wall."""
     ground = rj.plane(HEIGHT)
-    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.5 if quick else 0.4)
+    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.5 if quick else 0.2)
     rows = {}
     for name, surfaces in (("open", None), ("wall", wall)):
         solved = rj.solve(wake(surfaces, ground, quick))
@@ -197,21 +201,36 @@ def hangar(quick: bool) -> tuple[dict, object]:
         rows[name] = {"CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
         rows[name] |= {"converged": bool(solved.converged), "why": solved.why, "iterations": solved.found.iterations}
         rows[name] |= {"seconds": solved.found.wall_time_s}
+        if surfaces is not None:
+            rows[name] |= {"left": no_flow(solved), "panels": len(surfaces)} | at_the_wall(solved)
         print(json.dumps({name: rows[name]}), flush=True)
-    rows["wall"]["left"] = no_flow(solved)
     return rows, solved
+
+
+def at_the_wall(solved) -> dict:
+    """Share of the wake's free nodes that have come into the wall, and the flow through its face between the middles of
+    panels, rms over that of the wake without it, 0.02 R before it.
+    """
+    model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
+    x, y, z = np.moveaxis(np.asarray(rotate_about_shaft(state.far, azimuths(state)[:, None, None])), -1, 0)
+    inside = (y > 1.2) & (y < 1.7) & (np.abs(x) < 2) & (z < 1)
+    x, z = np.meshgrid(np.linspace(-1.9, 1.9, 39), np.linspace(-0.95, 0.95, 20))
+    face = jnp.asarray(np.stack([x, 1.18 + 0 * x, z], axis=-1).reshape(-1, 3))
+    bare = eqx.tree_at(lambda m: m.surfaces, model, None)
+    left, wanted = (jnp.sqrt(jnp.mean(velocity(state, face, m)[..., 1] ** 2)) for m in (model, bare))
+    return {"nodes_inside": float(inside.mean()), "through_face": float(left / wanted)}
 
 
 def draw_roof(rows: list[dict], path: Path) -> None:
     """Inflow, thrust and moments over the place of the edge."""
     edge = np.array([row["edge"] for row in rows])
     ok = np.array([row["converged"] for row in rows])
-    ideal = np.array([row["inflow"] / np.sqrt(row["CT"] / 2) for row in rows])
+    ratio = np.array([row["inflow_ratio"] for row in rows])
     states = of_finite_states(float(rows[-1]["CT"]))
     with style():
         figure = new_figure(9, 3.4)
         first, second = figure.subplots(1, 2)
-        first.plot(edge[ok], (ideal / ideal[-1])[ok], "o-", color=FREE_WAKE, label="free wake, panels")
+        first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
         first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
         first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
         first.legend()

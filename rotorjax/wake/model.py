@@ -27,6 +27,10 @@ from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, hover_settings
 
+AMONG = {"tip_core": 0.05}
+"""Settings of a wake among surfaces beyond those of hover: where turns are not round, thin old vortices wind round each
+other and the search stalls, as in flight."""
+
 
 class WakeState(eqx.Module):
     """The wake's part x_W of the state (Eq. 15).
@@ -180,13 +184,16 @@ def free_wake(
 ) -> FreeWake:
     """Make the model of a rotor's free wake, in or out of ground effect, beside and above solid surfaces.
 
-    settings: `hover_settings()` where none are given. surfaces: of `box`, `slab`, `wall`, `terrain` or `read_stl`,
-    added up; what of them rests on the ground is left out. Everything but shapes may be traced.
+    settings: `hover_settings()` where none are given, among surfaces with cores of 0.05 R. surfaces: of `box`, `slab`,
+    `wall`, `terrain` or `read_stl`, added up; what of them rests on the ground is left out. Everything but shapes may
+    be traced.
 
     Raises InputError where the rotor climbs over ground or surfaces, its solidity or tip Mach number is beyond sense,
     azimuths is no multiple of the number of blades, or surfaces cannot be closed (`panels.surface.solid`).
     """
-    settings = (hover_settings() if settings is None else settings).for_blades(rotor.blades)
+    if settings is None:
+        settings = hover_settings() if surfaces is None else hover_settings(**AMONG)
+    settings = settings.for_blades(rotor.blades)
     check_rotor(rotor, operating)
     if (ground is not None or surfaces is not None) and known(operating.climb) and float(operating.climb) != 0:
         raise InputError(

@@ -15,14 +15,12 @@ from rotorjax.panels.surface import normal_flow, solid
 from rotorjax.wake.equilibrium import displacement, look
 from rotorjax.wake.field import velocity
 
-SETTINGS = rj.WakeSettings(**COARSE)
+SETTINGS = rj.WakeSettings(**COARSE, azimuths=8, tip_core=0.05)
 WALL = {"bottom": -1.0, "top": 1.0, "length": 3.0, "thickness": 0.6, "panel": 0.6}
 
 
 def model(azimuth_deg=0.0):
-    return rj.free_wake(
-        *rj.rotor("knight_hefner_2", 8.0), None, SETTINGS, rj.wall(1.2, azimuth_deg=azimuth_deg, **WALL)
-    )
+    return rj.free_wake(*rj.rotor("uh60", 18.0), None, SETTINGS, rj.wall(1.2, azimuth_deg=azimuth_deg, **WALL))
 
 
 @pytest.fixture(scope="module")
