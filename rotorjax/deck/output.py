@@ -10,10 +10,59 @@ from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
 from rotorjax.bench.film import write_film
+from rotorjax.bench.markdown import table
+from rotorjax.io import netcdf
+from rotorjax.io.atomic import write_json
+from rotorjax.io.page import write_page
 
 DYNAMIC, STATIC = plotting.FREE_WAKE, plotting.VPBFSM
 FLAPPING = {"beta_0": r"$\beta_0$", "beta_1c": r"$\beta_{1c}$", "beta_1s": r"$\beta_{1s}$"}
 _SNAPSHOTS = 4
+
+
+def write_all(data: xr.Dataset, figures: dict[str, float], out: Path, *, animated: bool = False) -> dict[str, Any]:
+    """Write history.nc, report.json, report.html, histories and disk as PNG and PDF; on request animation.gif.
+
+    Returns the content of report.json. Raises InputError where a file cannot be written.
+    """
+    netcdf.write(out / "history.nc", data)
+    found = report(data, figures)
+    write_json(out / "report.json", found)
+    plotting.save(histories(data), out / "histories")
+    plotting.save(snapshots(data), out / "disk")
+    if animated:
+        animation(data, out / "animation.gif")
+    write_page(out / "report.html", markdown(found, data, animated=animated))
+    return found
+
+
+def markdown(found: dict[str, Any], data: xr.Dataset, *, animated: bool = False) -> str:
+    """The page of a case: what the ground did, pictures, histories."""
+    most, rows = found["largest_difference_from_static"], found["histories"]
+    thrust = rows["thrust"]
+    pictures = {
+        "histories.png": "The deck under the hub, inflow, thrust and flapping. Dashed: the steady ground effect "
+        "of each instant.",
+        "disk.png": "The inflow over the disk, seen from above.",
+        **({"animation.gif": "The rotor over its deck."} if animated else {}),
+    }
+    head = ("history", "unit", "first", "last", "least", "most")
+    cells = [
+        (n, data[n].attrs.get("units", ""), *(r[k] for k in ("first", "last", "min", "max"))) for n, r in rows.items()
+    ]
+    parts = [
+        f"# Over a deck: {found['rotor']}, {found['variant']} ground effect",
+        f"- At a collective of {found['collective_deg']:.2f}° C_T goes from {thrust['first']:.5f} to "
+        f"{thrust['last']:.5f}, between {thrust['min']:.5f} and {thrust['max']:.5f}.\n"
+        f"- The mean inflow differs from the steady one of the same instant by up to {100 * most['relative']:.1f} %, "
+        f"at {most['time_s']:.1f} s.\n"
+        f"- At most {100 * found['ground_residual_max']:.1f} % of the flow into the deck is left on it.\n"
+        f"- {found['simulated_s']:.1f} s in {found['steps']} steps of {found['step_us']:.0f} µs.",
+        *(f"![{name}]({name})\n\n{caption}" for name, caption in pictures.items()),
+        "## Histories\n\n" + table(head, cells),
+        "history.nc holds all of it over time. λ positive down, over ΩR; heights over R; C_T = T/(ρA(ΩR)²).",
+    ]
+    return "\n\n".join(parts) + "\n"
 
 
 def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
