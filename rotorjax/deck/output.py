@@ -1,6 +1,6 @@
 """A rotor over a ship's deck: pictures, animation and report of its histories."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ def markdown(found: dict[str, Any], data: xr.Dataset, *, animated: bool = False)
     ]
     parts = [
         f"# Over a deck: {found['rotor']}, {found['variant']} ground effect",
-        f"- At a collective of {found['collective_deg']:.2f}° C_T goes from {thrust['first']:.5f} to "
+        f"- From a collective of {found['collective_deg']:.2f}° on C_T goes from {thrust['first']:.5f} to "
         f"{thrust['last']:.5f}, between {thrust['min']:.5f} and {thrust['max']:.5f}.\n"
         f"- The mean inflow differs from the steady one of the same instant by up to {100 * most['relative']:.1f} %, "
         f"at {most['time_s']:.1f} s.\n"
@@ -67,7 +67,18 @@ def markdown(found: dict[str, Any], data: xr.Dataset, *, animated: bool = False)
 
 def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
     """Return the numbers of report.json: measured figures, and extremes, ends and lag of the histories."""
-    names = ("height", "slope", "uniform", "cosine", "sine", "thrust", "static_uniform", "static_thrust", *FLAPPING)
+    names = (
+        "height",
+        "slope",
+        "collective",
+        "uniform",
+        "cosine",
+        "sine",
+        "thrust",
+        "static_uniform",
+        "static_thrust",
+        *FLAPPING,
+    )
     series = {
         name: {
             "first": float(data[name][0]),
@@ -101,7 +112,9 @@ def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
 
 
 def histories(data: xr.Dataset) -> Figure:
-    """Draw deck's motion, inflow's three parts, thrust and flapping over time, beside the static ground effect."""
+    """Draw deck's motion, inflow's three parts, thrust and collective, and flapping over time, beside the static
+    ground effect.
+    """
     flapping = "beta_0" in data
     with plotting.style():
         figure = plotting.new_figure(7.5, 9.8 if flapping else 8.0)
@@ -116,14 +129,14 @@ def histories(data: xr.Dataset) -> Figure:
         slope.set_ylabel("deg")
         slope.grid(visible=False)
         lines = [*axes[0].get_lines(), *slope.get_lines()]
-        axes[0].legend(
-            lines, [str(line.get_label()) for line in lines], ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
-        )
+        _legend(axes[0], lines)
         _pair(axes[1], t, data["uniform"], data["static_uniform"], r"$\lambda_0/\Omega R$", data.attrs["variant"])
         _pair(axes[2], t, data["cosine"], data["static_cosine"], r"$\lambda_{1c},\ \lambda_{1s}$", r"$\lambda_{1c}$")
         axes[2].plot(t, data["sine"], color="#009E73", lw=1.0, label=r"$\lambda_{1s}$")
-        axes[2].legend(ncols=3, loc="best")
+        _legend(axes[2], axes[2].get_lines())
         _pair(axes[3], t, data["thrust"], data["static_thrust"], r"$C_T$", data.attrs["variant"])
+        if float(np.ptp(data["collective"].values)) > 0:
+            _collective(axes[3], data)
         if flapping:
             _flapping(axes[4], data)
         axes[-1].set_xlabel("time, s")
@@ -135,7 +148,21 @@ def _pair(axes: Any, t: np.ndarray, ours: xr.DataArray, steady: xr.DataArray, la
     axes.plot(t, steady, color=STATIC, ls="--", lw=1.1, label="steady at each instant")
     axes.plot(t, ours, color=DYNAMIC, label=name)
     axes.set_ylabel(label)
-    axes.legend(ncols=2, loc="best")
+    _legend(axes, axes.get_lines())
+
+
+def _legend(axes: Any, lines: Sequence[Any]) -> None:
+    """A legend above the axes, where it hides no curve."""
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+
+
+def _collective(axes: Any, data: xr.Dataset) -> None:
+    """Collective on the right."""
+    right = axes.twinx()
+    right.grid(visible=False)
+    lines = right.plot(data["time"], data["collective"], color="#009E73", lw=1.0, label=r"$\theta_0$ (right)")
+    right.set_ylabel("deg")
+    _legend(axes, [*axes.get_lines(), *lines])
 
 
 def _flapping(axes: Any, data: xr.Dataset) -> None:
@@ -149,7 +176,7 @@ def _flapping(axes: Any, data: xr.Dataset) -> None:
         lines += side.plot(data["time"], data[name], color=colour, lw=1.1, label=label)
     axes.set_ylabel("tilt, deg")
     right.set_ylabel("coning, deg")
-    axes.legend(lines, [line.get_label() for line in lines], ncols=3, loc="best")
+    _legend(axes, lines)
 
 
 def snapshots(data: xr.Dataset) -> Figure:
