@@ -12,7 +12,7 @@ What the door offers is imported when it is first asked for; `jax.config` is lef
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _DOOR = {  # name: room, and what it is called there if not the same
     "finite_state": "rotorjax.api.models",

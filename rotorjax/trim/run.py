@@ -165,6 +165,8 @@ def numbers(result: Result) -> dict[str, Any]:
     request, outcome, flown = result.request, result.trimmed.outcome, result.means
     names = ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s", "lag_0")
     angles = np.rad2deg([*flown.controls, *flown.flap, flown.lag[0]])
+    tip = float(request.operating.tip_speed(request.rotor.radius))
+    force = float(request.operating.density) * np.pi * float(request.rotor.radius) ** 2 * tip**2
     return {
         "rotor": request.rotor.name,
         "inflow": request.inflow,
@@ -183,6 +185,8 @@ def numbers(result: Result) -> dict[str, Any]:
         "CT": flown.CT,
         "CT_over_solidity": flown.CT / float(solidity(request.rotor)),
         "CP": flown.CQ,
+        "thrust_newton": flown.CT * force,
+        "power_watt": flown.CQ * force * tip,
         "CP_induced": flown.CP_induced,
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
@@ -204,12 +208,13 @@ def table(found: dict[str, Any]) -> str:
     """The same for the screen."""
     place = "out of ground effect" if found["height"] is None else f"h = {found['height']:g} R"
     rows = (
-        "{rotor}, {inflow}: C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio {advance_ratio:g}, " + place,
+        "{rotor}, {inflow}: {thrust_newton:.0f} N, C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio "
+        "{advance_ratio:g}, " + place,
         "controls  θ₀ {collective_deg:.3f}°, θ₁c {theta_1c_deg:.3f}°, θ₁s {theta_1s_deg:.3f}°, "
         "shaft {tilt_deg:.3f}° forward",
         "blades    β₀ {beta_0_deg:.3f}°, β₁c {beta_1c_deg:.3f}°, β₁s {beta_1s_deg:.3f}°, lag {lag_0_deg:.3f}°",
-        "power     C_P {CP:.4e}: induced {CP_induced:.4e}, profile {CP_profile:.4e}, parasite {CP_parasite:.4e}, "
-        "lag dampers {CP_damper:.1e}",
+        "power     {power_kw:.1f} kW, C_P {CP:.4e}: induced {CP_induced:.4e}, profile {CP_profile:.4e}, parasite "
+        "{CP_parasite:.4e}, lag dampers {CP_damper:.1e}",
         "in {iterations} steps, {wall_time_s:.1f} s, {verdict_text}",
     )
-    return "\n".join(rows).format(**found)
+    return "\n".join(rows).format(**found, power_kw=found["power_watt"] / 1e3)
