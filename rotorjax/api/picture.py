@@ -28,6 +28,7 @@ def picture(data: xr.Dataset) -> Figure:
     mountain, valley = (inflow[0], valley_side(inflow)) if around else (inflow[0], inflow[0])
     where = "out of ground effect" if np.isnan(data["height"]) else f"h = {float(data['height']):g} R"
     where += f", slope {float(data['slope_deg']):g}°" if sloping else ""
+    where += f", {data.attrs['panels']} panels" if data.attrs.get("panels") else ""
     with style():
         figure = new_figure(10.5 if around else 6.0, 4.0)
         axes = figure.add_subplot(1, 2 if around else 1, 1)
