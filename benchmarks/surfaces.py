@@ -101,26 +101,30 @@ def no_flow(solved) -> float:
 
 def derivative(quick: bool) -> dict:
     """d C_T by the distance of a wall: periodic wake and all, and of the wake held as it is."""
+    wall = rj.wall(1.3, -1.0, 1.0, length=3.0, thickness=0.5, panel=0.5)
 
-    def beside(distance):
-        return wake(rj.wall(distance, -1.0, 1.0, length=3.0, thickness=0.5, panel=0.5), quick=quick)
+    def beside(farther):
+        return wake(wall.moved((farther, 0.0, 0.0)), quick=quick)
 
-    here = rj.solve(beside(1.3), tol=1e-10)
+    here = rj.solve(beside(0.0), tol=1e-10)
+    print(json.dumps({"beside": float(here.CT), "why": here.why, "left_through_panels": no_flow(here)}), flush=True)
     step = 1e-4
-    there = [float(rj.solve(beside(1.3 + s), here, tol=1e-10).CT) for s in (step, -step)]
+    there = [float(rj.solve(beside(s), here, tol=1e-10).CT) for s in (step, -step)]
+    row = {"differences": (there[0] - there[1]) / (2 * step)}
 
-    def thrust(distance):
-        model = beside(distance)
+    @jax.jit
+    def thrust(farther):
+        model = beside(farther)
         return readings(model, periodic_wake(here.found, model)).CT
 
-    def frozen(distance):
-        model = beside(distance)
-        return jnp.mean(evaluate(model, here.found.unknowns).velocities.control[..., 2])
+    @jax.jit
+    def frozen(farther):
+        return jnp.mean(evaluate(beside(farther), here.found.unknowns).velocities.control[..., 2])
 
-    row = {"implicit": float(jax.jvp(thrust, (1.3,), (1.0,))[1]), "differences": (there[0] - there[1]) / (2 * step)}
-    row["frozen"] = float(jax.jvp(frozen, (1.3,), (1.0,))[1])
-    row["frozen_differences"] = float(frozen(1.3 + 1e-5) - frozen(1.3 - 1e-5)) / 2e-5
-    row |= {"converged": bool(here.converged), "left_through_panels": no_flow(here)}
+    row["frozen_forward"] = float(jax.jvp(frozen, (0.0,), (1.0,))[1])
+    row["frozen_differences"] = float(frozen(1e-4) - frozen(-1e-4)) / 2e-4
+    print(json.dumps({"derivative": row}), flush=True)
+    row["implicit_forward"] = float(jax.jvp(thrust, (0.0,), (1.0,))[1])
     print(json.dumps({"derivative": row}), flush=True)
     return row
 
@@ -156,16 +160,21 @@ def cost(quick: bool) -> dict:
 
 def roof(quick: bool) -> list[dict]:
     """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive."""
-    rows, last, open_air = [], None, rj.solve(wake(quick=quick))
-    alone = float(open_air.mean_inflow / jnp.sqrt(open_air.CT))
+    rows, last = [], None
+    alone, whole = (
+        float(one.mean_inflow / jnp.sqrt(one.CT))
+        for one in (rj.solve(wake(ground=ground, quick=quick)) for ground in (None, rj.plane(HEIGHT)))
+    )
+    print(json.dumps({"inflow over whole ground, over that in free air": whole / alone}), flush=True)
     house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.5 if quick else 0.35)
-    for edge in sorted(PLACES[::2] if quick else PLACES, reverse=True):
+    for edge in (3.0, *PLACES[::-1]):
         house = house_at_hub.moved((float(edge), 0, 0))
         began = time.perf_counter()
         solved = rj.solve(wake(house, quick=quick), last)
         c_l, c_m = moments(solved)
         row = {"edge": float(edge), "CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
         row["inflow_ratio"] = float(solved.mean_inflow / jnp.sqrt(solved.CT)) / alone
+        row["whole_ground"] = whole / alone
         row |= {"converged": bool(solved.converged), "why": solved.why, "left": no_flow(solved), "panels": len(house)}
         row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations}
         print(json.dumps({"roof": row}), flush=True)
@@ -193,7 +202,7 @@ def of_finite_states(thrust: float) -> np.ndarray:
 def hangar(quick: bool) -> tuple[dict, object]:
     """A rotor over ground beside a wall that stands 1.2 R to starboard; and without the wall."""
     ground = rj.plane(HEIGHT)
-    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.5 if quick else 0.2)
+    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.25 if quick else 0.15)
     rows = {}
     for name, surfaces in (("open", None), ("wall", wall)):
         solved = rj.solve(wake(surfaces, ground, quick))
@@ -231,6 +240,7 @@ def draw_roof(rows: list[dict], path: Path) -> None:
         figure = new_figure(9, 3.4)
         first, second = figure.subplots(1, 2)
         first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
+        first.axhline(rows[0]["whole_ground"], color=FREE_WAKE, linestyle=":", label="free wake, whole ground")
         first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
         first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
         first.legend()
