@@ -259,10 +259,10 @@ def draw_hangar(solved, path: Path) -> None:
     points = np.stack([0 * s, s, z], axis=-1).reshape(-1, 3)
     flow = np.asarray(rj.velocity(solved, jnp.asarray(points))).reshape(*s.shape, 3)
     with style():
-        figure = new_figure(7.5, 4.6)
+        figure = new_figure(7.5, 4.0)
         axes = figure.add_subplot()
         speed = np.hypot(flow[..., 1], flow[..., 2])
-        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.12, 13), cmap="viridis", extend="max")
+        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.09, 13), cmap="viridis", extend="max")
         axes.streamplot(
             s[0], z[:, 0], flow[..., 1], flow[..., 2], color="white", linewidth=0.5, arrowsize=0.6, density=1.4
         )
