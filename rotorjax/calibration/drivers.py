@@ -54,9 +54,10 @@ class Descent:
         """The residual and its Jacobian with respect to the values, at coordinates z."""
         if self._last is None or not np.array_equal(self._last[0], z):
             begun = time.perf_counter()
-            self._last = np.array(z), tuple(np.asarray(v) for v in self._program(self.parameters.bounded(z)))
+            r, jacobian = map(np.asarray, self._program(self.parameters.bounded(z)))
+            self._last = np.array(z), r, jacobian
             self.compile_time_s = self.compile_time_s or time.perf_counter() - begun
-        return self._last[1]
+        return self._last[1:]
 
     def residual(self, z: Float[np.ndarray, " P"]) -> np.ndarray:
         """The residual, (N,)."""

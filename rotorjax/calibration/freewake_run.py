@@ -73,8 +73,8 @@ def run(
     taught = data.choose([n for n in data.names if n not in held])
     fit = calibrate(residual, chosen, taught, method=method, progress=progress)
     values = PARAMETERS.complete(jnp.asarray(fit.values), data.free, data.fixed)
-    fields = [np.asarray(inflow(v, data)) for v in (jnp.asarray(PARAMETERS.printed), values)]
-    before, after = (rms_difference(field, data) for field in fields)
+    field_before, field_after = (np.asarray(inflow(v, data)) for v in (jnp.asarray(PARAMETERS.printed), values))
+    before, after = (rms_difference(field, data) for field in (field_before, field_after))
     about = {
         "radial_terms": int((data.model.modes.m == 0).sum()),
         "source_terms": int((data.model.sources.m == 0).sum()),
@@ -83,7 +83,7 @@ def run(
         "study": str(merged.attrs.get("fingerprint", "")),
         "free": list(data.free),
     }
-    return FreeWakeRun(data, held, fit, np.asarray(values), before, after, *fields, about)
+    return FreeWakeRun(data, held, fit, np.asarray(values), before, after, field_before, field_after, about)
 
 
 def gradient_cost(data: Lessons, values: np.ndarray, repeats: int = 20) -> dict[str, float]:

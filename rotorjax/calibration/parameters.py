@@ -78,7 +78,7 @@ class ParameterSet:
             raise InputError(f"Argument `parameters` must be among {', '.join(self.names)}, but holds {unknown[0]!r}")
         return ParameterSet(self.name, tuple(p for p in self.parameters if p.name in names))
 
-    def bounded(self, z: Float[Array, "*N P"]) -> Float[Array, "*N P"]:
+    def bounded(self, z: Float[Array | np.ndarray, "*N P"]) -> Float[Array, "*N P"]:
         """Values of unbounded coordinates."""
         return jnp.asarray(self.lower) + (self.upper - self.lower) * jax.nn.sigmoid(z)
 
