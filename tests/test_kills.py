@@ -4,19 +4,21 @@ The wakes are made up and written slowly, so that kills hit waits and writes; as
 `ROTORJAX_KILLS=30 pytest tests/test_kills.py`.
 """
 
+import multiprocessing
 import os
 import random
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 
+import jax
 import pytest
 import xarray as xr
 from wakes import made_up
 
 from rotorjax.bench.cases import study_cases
+from rotorjax.bench.settings import study_settings
 from rotorjax.cli import main
 from rotorjax.io import netcdf
 from rotorjax.study import run
@@ -24,20 +26,14 @@ from rotorjax.study.run import solve_cases
 
 KILLS = int(os.environ.get("ROTORJAX_KILLS", "4"))
 HEIGHTS, SLOPES = [3.0, 2.0, 1.5, 1.0, 0.75], [5.0, 10.0]
-STUDY = f"""
-import sys, time
-from pathlib import Path
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-import jax
-jax.config.update("jax_enable_x64", True)
-from wakes import made_up
-from rotorjax.bench.cases import study_cases
-from rotorjax.bench.settings import study_settings
-from rotorjax.study import run
+FORKS = multiprocessing.get_context("forkserver")  # what takes seconds to import is imported once, jax not yet started
+FORKS.set_forkserver_preload(["rotorjax.study.run", "rotorjax.bench.settings", "rotorjax.bench.dataset"])
+
 
 def slow(model, start, progress):
     time.sleep(0.05)
     return made_up(model, start, progress)
+
 
 def in_halves(self, content):
     with open(self, "wb") as file:
@@ -46,14 +42,26 @@ def in_halves(self, content):
             file.flush()
             time.sleep(0.03)
 
-Path.write_bytes = in_halves
-run.add_finite_state = lambda data, settings: data
-run.solve_cases(study_cases({HEIGHTS}, {SLOPES}), study_settings(), sys.argv[1], show=False, solver=slow)
-"""
+
+def study(folder):
+    """In a process of its own: all cases, slowly, without a word."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
+    jax.config.update("jax_enable_x64", True)
+    Path.write_bytes = in_halves
+    run.add_finite_state = lambda data, settings: data
+    solve_cases(study_cases(HEIGHTS, SLOPES), study_settings(), folder, show=False, solver=slow)
 
 
 def started(folder):
-    return subprocess.Popen([sys.executable, "-c", STUDY, str(folder)], stderr=subprocess.DEVNULL)
+    process = FORKS.Process(target=study, args=(folder,))
+    process.start()
+    return process
+
+
+def ended(process):
+    """Its exit code."""
+    process.join(120)
+    return process.exitcode
 
 
 def kept(folder):
@@ -67,8 +75,6 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run, "add_finite_state", lambda data, settings: data)
-        from rotorjax.bench.settings import study_settings
-
         solve_cases(study_cases(HEIGHTS, SLOPES), study_settings(), folder, show=False, solver=made_up)
     return kept(folder)
 
@@ -82,12 +88,12 @@ def same(ours, theirs):
 def kill_when_some_are_done(folder, chance, how):
     """Kill a run once it has kept a case more, a moment later. Returns the files that were there then."""
     process, before = started(folder), len(list(folder.glob("cases/*.nc")))
-    while process.poll() is None and len(list(folder.glob("cases/*.nc"))) == before:
+    while process.is_alive() and len(list(folder.glob("cases/*.nc"))) == before:
         time.sleep(0.005)
     time.sleep(chance.uniform(0.0, 0.15))
     finished = {path.name: path.read_bytes() for path in folder.glob("cases/*.nc")}
-    process.send_signal(how)
-    process.wait(60)
+    os.kill(process.pid, how)
+    ended(process)
     return finished
 
 
@@ -102,14 +108,14 @@ def test_kills_at_random_moments_lose_no_finished_case(tmp_path, whole):
         for name, content in finished.items():
             assert (folder / "cases" / name).read_bytes() == content
     for folder in folders:
-        assert started(folder).wait(120) == 0
+        assert ended(started(folder)) == 0
         same(kept(folder), whole)  # no temporary file either
 
 
 @pytest.mark.slow
 def test_two_runs_in_one_folder_end_alike(tmp_path, whole):
     both = [started(tmp_path), started(tmp_path)]
-    assert [process.wait(120) for process in both] == [0, 0]
+    assert [ended(process) for process in both] == [0, 0]
     same(kept(tmp_path), whole)
 
 

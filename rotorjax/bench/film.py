@@ -1,15 +1,16 @@
 """Films: animated GIF files."""
 
-import tempfile
-from collections.abc import Callable
+import io
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import matplotlib as mpl
-from matplotlib.animation import FuncAnimation, PillowWriter
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image  # matplotlib's own
 
 from rotorjax.bench import plotting
-from rotorjax.errors import InputError
 from rotorjax.io.atomic import write_bytes
 
 
@@ -30,23 +31,16 @@ def write_film(
         draw(0)
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # laid out once, not again for each frame
-
-        def again(frame: int) -> list:
-            draw(frame)
-            return []
-
-        film = FuncAnimation(figure, again, frames=frames, blit=False)
-        write_bytes(path, _saved(film, frames_per_second))
+        first, *others = _pictures(figure, draw, frames)
+    file = io.BytesIO()
+    first.save(file, "GIF", save_all=True, append_images=others, duration=round(1000 / frames_per_second), loop=0)
+    write_bytes(path, file.getvalue())
 
 
-def _saved(film: FuncAnimation, frames_per_second: int) -> bytes:
-    """The film as a file's content, by way of a temporary file: matplotlib writes films to paths only."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="rotorjax-") as folder:
-            made = Path(folder) / "film.gif"
-            film.save(made, writer=PillowWriter(fps=frames_per_second))
-            return made.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{tempfile.gettempdir()}: the folder for temporary files must take a film, but does not: {error.strerror}"
-        ) from None
+def _pictures(figure: Figure, draw: Callable[[int], None], frames: int) -> Iterator[Image.Image]:
+    """Each frame, drawn once."""
+    canvas = FigureCanvasAgg(figure)
+    for frame in range(frames):
+        draw(frame)
+        canvas.draw()
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])

@@ -1,8 +1,8 @@
 """Fit bounded parameters to data: one residual function, three drivers, one verdict.
 
-    fit = calibrate(residual, parameters, data)                    # Levenberg–Marquardt (optimistix)
-    fit = calibrate(residual, parameters, data, method="lbfgs")    # or "adam" (optax)
-    many = calibrate_many(residual, parameters, data, starts)      # one least-squares fit for each start, by vmap
+    fit = calibrate(residual, parameters, data)                    # Levenberg–Marquardt
+    fit = calibrate(residual, parameters, data, method="lbfgs")    # or "adam"
+    many = calibrate_many(residual, parameters, data, starts)      # one least-squares fit for each start
 
 residual(values, data) → (N,) holds weighted differences of model and target, N ≥ P. Every driver is judged alike, from
 the Jacobian at its end: one more Gauss–Newton step must not move a parameter by more than 1e-5 of its range, the data
@@ -10,28 +10,18 @@ must determine every parameter, and no parameter may sit at a bound.
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, get_args
+from typing import NamedTuple
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
-from jaxtyping import Array, ArrayLike, Float, PyTree
+from jaxtyping import ArrayLike, Float, PyTree
 
-from rotorjax.calibration.descent import descend
+from rotorjax.calibration.drivers import DRIVERS, Descent, Method, Progress, Residual
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.errors import InputError
 
-Residual = Callable[[Float[Array, " P"], Any], Float[Array, " N"]]
-Progress = Callable[[int, float], None]
-Method = Literal["least_squares", "lbfgs", "adam"]
-
 STEP_LEFT = 1e-5  # of a parameter's range
 UNDETERMINED = 1e-9  # smallest over largest singular value of the scaled Jacobian
-_TOLERANCE = 1e-8  # of a step in the unbounded coordinates; the verdict is taken from the Jacobian all the same
 
 
 class Verdict(NamedTuple):
@@ -44,10 +34,10 @@ class Verdict(NamedTuple):
     bound.
     """
 
-    rms: Float[Array, ""]
-    left: Float[Array, ""]
-    rank: Float[Array, ""]
-    covariance: Float[Array, "P P"]
+    rms: float
+    left: float
+    rank: float
+    covariance: Float[np.ndarray, "P P"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +46,7 @@ class Fit:
 
     values (P,): of `parameters`, in order. rms, covariance: see `Verdict`. history: rms after every step, the start
     included. converged, why: the verdict and one sentence. at_bound: names of parameters held by a bound. wall_time_s:
-    of the whole fit; compile_time_s: what of it went before the first step was done.
+    of the whole fit; compile_time_s: what of it went before the first evaluation was done.
     """
 
     parameters: ParameterSet
@@ -104,36 +94,29 @@ def calibrate(
     """Fit parameters so that Σ residual² is least.
 
     start: inside the ranges (default: the printed values where these are inside, else the middle). max_steps: default
-    200 of least squares or L-BFGS, 4000 of Adam. progress(step, rms): called now and then. Raises InputError where the
-    method is unknown, the start is outside, there are fewer data than parameters, or the residual is not finite there.
+    200 of least squares or L-BFGS, 4000 of Adam. progress(step, rms): called after every step. Raises InputError where
+    the method is unknown, the start is outside, there are fewer data than parameters, or the residual is not finite
+    there.
     """
-    if method not in get_args(Method):
-        raise InputError(f"Argument `method` must be one of {', '.join(get_args(Method))}, but is {method!r}")
+    if method not in DRIVERS:
+        raise InputError(f"Argument `method` must be one of {', '.join(DRIVERS)}, but is {method!r}")
     begun = time.perf_counter()
-    z = parameters.unbounded(_start(parameters, start))
-    first = _check(residual, parameters, data, z)
-    unknown = _InCoordinates(residual, parameters)
-    if method == "least_squares":
-        z, history, compiled = _levenberg_marquardt(unknown, data, z, max_steps or 200, progress)
-    else:
-        z, history, compiled = descend(
-            unknown, data, z, method, max_steps or (200 if method == "lbfgs" else 4000), progress
-        )
-    values = parameters.bounded(z)
-    verdict = judge(residual, parameters, data, values)
+    descent = Descent(residual, parameters, data, progress)
+    z, verdict = _descend(descent, _start(parameters, start), method, max_steps)
+    values = np.asarray(parameters.bounded(z))
     converged, why = conclude(parameters, values, verdict)
     return Fit(
         parameters,
-        np.asarray(values),
-        float(verdict.rms),
-        np.asarray(verdict.covariance),
+        values,
+        verdict.rms,
+        verdict.covariance,
         converged,
         why,
         parameters.at_bound(values),
-        np.array([first, *history]),
+        np.array(descent.history),
         method,
         time.perf_counter() - begun,
-        compiled,
+        descent.compile_time_s,
     )
 
 
@@ -144,14 +127,27 @@ def calibrate_many(
     starts: ArrayLike,
     max_steps: int = 200,
 ) -> Many:
-    """Fit from every start, in one program. Raises InputError as `calibrate` does."""
+    """Fit from every start. Raises InputError as `calibrate` does."""
     begun = time.perf_counter()
-    z = parameters.unbounded(parameters.check(starts, "starts"))
-    _check(residual, parameters, data, z[0])
-    values, good, verdict = jax.block_until_ready(_solve_many(_InCoordinates(residual, parameters), data, z, max_steps))
-    held = np.array([bool(parameters.at_bound(row)) for row in np.asarray(values)])
-    converged = np.asarray(good) & (np.asarray(verdict.left) <= STEP_LEFT) & ~held
-    return Many(np.asarray(values), np.asarray(verdict.rms), converged, time.perf_counter() - begun)
+    values, rms, converged = [], [], []
+    for start in parameters.check(starts, "starts"):
+        z, verdict = _descend(Descent(residual, parameters, data), start, "least_squares", max_steps)
+        values.append(np.asarray(parameters.bounded(z)))
+        rms.append(verdict.rms)
+        converged.append(conclude(parameters, values[-1], verdict)[0])
+    return Many(np.array(values), np.array(rms), np.array(converged), time.perf_counter() - begun)
+
+
+def _descend(
+    descent: Descent, start: Float[np.ndarray, " P"], method: Method, steps: int | None
+) -> tuple[np.ndarray, Verdict]:
+    """Where a driver ends, in the unbounded coordinates, and the verdict on it."""
+    z = descent.parameters.unbounded(start)
+    _check(descent, z)
+    descent.note(z)
+    driver, usual = DRIVERS[method]
+    z = driver(descent, z, steps or usual)
+    return z, judge(descent.parameters, *descent.at(z))
 
 
 def even_starts(parameters: ParameterSet, count: int) -> np.ndarray:
@@ -169,24 +165,22 @@ def even_starts(parameters: ParameterSet, count: int) -> np.ndarray:
     return parameters.lower + (parameters.upper - parameters.lower) * (0.05 + 0.9 * share)
 
 
-@eqx.filter_jit
-def judge(residual: Residual, parameters: ParameterSet, data: PyTree, values: Float[Array, " P"]) -> Verdict:
-    """Read the verdict off the residual and its Jacobian at values (P,)."""
-    width = jnp.asarray(parameters.upper - parameters.lower)
-    r = residual(values, data)
-    jacobian = jax.jacfwd(residual)(values, data) * width
-    u, s, vt = jnp.linalg.svd(jacobian, full_matrices=False)
-    rank = s[-1] / s[0]
-    known = rank > UNDETERMINED
-    inverse = jnp.where(known, 1 / jnp.where(known, s, 1.0), jnp.nan)
+def judge(parameters: ParameterSet, r: Float[np.ndarray, " N"], jacobian: Float[np.ndarray, "N P"]) -> Verdict:
+    """Read the verdict off the residual and its Jacobian with respect to the values."""
+    if not np.all(np.isfinite(r)) or not np.all(np.isfinite(jacobian)):
+        return Verdict(np.nan, np.nan, np.nan, np.full((len(parameters), len(parameters)), np.nan))
+    width = parameters.upper - parameters.lower
+    u, s, vt = np.linalg.svd(jacobian * width, full_matrices=False)
+    rank = float(s[-1] / s[0]) if s[0] else 0.0
+    inverse = 1 / s if rank > UNDETERMINED else np.full_like(s, np.nan)
     step = vt.T @ (inverse * (u.T @ r))
-    spare = r.size - values.size
-    variance = jnp.sum(r * r) / spare if spare else jnp.nan
-    covariance = variance * (vt.T * inverse**2) @ vt * jnp.outer(width, width)
-    return Verdict(jnp.sqrt(jnp.mean(r * r)), jnp.max(jnp.abs(step)), rank, covariance)
+    spare = r.size - len(parameters)
+    variance = r @ r / spare if spare else np.nan
+    covariance = variance * (vt.T * inverse**2) @ vt * np.outer(width, width)
+    return Verdict(float(np.sqrt(np.mean(r * r))), float(np.max(np.abs(step))), rank, covariance)
 
 
-def conclude(parameters: ParameterSet, values: Float[Array, " P"], verdict: Verdict) -> tuple[bool, str]:
+def conclude(parameters: ParameterSet, values: Float[np.ndarray, " P"], verdict: Verdict) -> tuple[bool, str]:
     """Whether a fit converged, and why in one sentence."""
     if not np.isfinite(verdict.rms):
         return False, "the residual is not finite at the end"
@@ -194,20 +188,20 @@ def conclude(parameters: ParameterSet, values: Float[Array, " P"], verdict: Verd
         return False, f"held by a bound: {', '.join(held)}; widen the range or take fewer parameters"
     if not verdict.rank > UNDETERMINED:
         return False, "the data do not determine every parameter; take fewer or more data"
-    left = f"one more Gauss-Newton step would move a parameter by {float(verdict.left):.1e} of its range"
-    return bool(verdict.left <= STEP_LEFT), left
+    left = f"one more Gauss-Newton step would move a parameter by {verdict.left:.1e} of its range"
+    return verdict.left <= STEP_LEFT, left
 
 
-def _start(parameters: ParameterSet, start: ArrayLike | None) -> Float[Array, " P"]:
+def _start(parameters: ParameterSet, start: ArrayLike | None) -> Float[np.ndarray, " P"]:
     if start is not None:
         return parameters.check(start)
     inside = (parameters.printed > parameters.lower) & (parameters.printed < parameters.upper)
     return parameters.check(np.where(inside, parameters.printed, (parameters.lower + parameters.upper) / 2))
 
 
-def _check(residual: Residual, parameters: ParameterSet, data: PyTree, z: Float[Array, " P"]) -> float:
-    """The rms at the start. Raises InputError where the fit cannot begin."""
-    r = np.asarray(residual(parameters.bounded(z), data))
+def _check(descent: Descent, z: Float[np.ndarray, " P"]) -> None:
+    """Raise InputError where the fit cannot begin."""
+    r, parameters = descent.residual(z), descent.parameters
     if r.size < len(parameters):
         raise InputError(
             f"Argument `parameters` must be no more than the data, but there are {len(parameters)} "
@@ -215,63 +209,3 @@ def _check(residual: Residual, parameters: ParameterSet, data: PyTree, z: Float[
         )
     if not np.all(np.isfinite(r)):
         raise InputError("Argument `start` must give a finite residual, but it does not")
-    return float(np.sqrt(np.mean(r * r)))
-
-
-class _InCoordinates(eqx.Module):
-    """A residual as a function of the unbounded coordinates; equal ones share their compilation."""
-
-    residual: Residual = eqx.field(static=True)
-    parameters: ParameterSet = eqx.field(static=True)
-
-    def __call__(self, z: Float[Array, " P"], data: Any) -> Float[Array, " N"]:
-        return self.residual(self.parameters.bounded(z), data)
-
-
-def _solver() -> optx.LevenbergMarquardt:
-    return optx.LevenbergMarquardt(rtol=_TOLERANCE, atol=_TOLERANCE)
-
-
-@eqx.filter_jit
-def _solve_many(unknown: _InCoordinates, data, z, max_steps):
-    def one(start):
-        found = optx.least_squares(unknown, _solver(), start, data, max_steps=max_steps, throw=False)
-        values = unknown.parameters.bounded(found.value)
-        good = found.result == optx.RESULTS.successful
-        return values, good, judge(unknown.residual, unknown.parameters, data, values)
-
-    return jax.lax.map(one, z)  # side by side all would go on until the last is done, four times as long, and in GBs
-
-
-@eqx.filter_jit
-def _first_state(unknown: _InCoordinates, data, z):
-    shape = jax.eval_shape(unknown, z, data)
-    return _solver().init(lambda z, data: (unknown(z, data), None), z, data, {}, shape, None, frozenset())
-
-
-@eqx.filter_jit
-def _step(unknown: _InCoordinates, data, z, state):
-    """One step: z, state, rms, and whether that was the last."""
-
-    def function(z, data):
-        return unknown(z, data), None
-
-    z, state, _ = _solver().step(function, z, data, {}, state, frozenset())
-    done, _ = _solver().terminate(function, z, data, {}, state, frozenset())
-    return z, state, jnp.sqrt(jnp.mean(unknown(z, data) ** 2)), done
-
-
-def _levenberg_marquardt(unknown: _InCoordinates, data, z, max_steps, progress):
-    """Step by step, so that there is a history and someone can watch; returns z, rms after each step, compile time."""
-    begun, compiled, history = time.perf_counter(), 0.0, []
-    state = _first_state(unknown, data, z)
-    for i in range(max_steps):
-        z, state, rms, done = _step(unknown, data, z, state)
-        history.append(float(rms))
-        if i == 0:
-            compiled = time.perf_counter() - begun
-        if progress is not None:
-            progress(i + 1, history[-1])
-        if bool(done):
-            break
-    return z, history, compiled

@@ -12,7 +12,8 @@ import numpy as np
 import xarray as xr
 
 from rotorjax.calibration.calibration_file import Calibration
-from rotorjax.calibration.fit import Fit, Method, Progress, calibrate
+from rotorjax.calibration.drivers import Method, Progress
+from rotorjax.calibration.fit import Fit, calibrate
 from rotorjax.calibration.record import fit_entry
 from rotorjax.calibration.taught import PARAMETERS
 from rotorjax.calibration.teacher import Lessons, default_held, inflow, lessons, residual, rms_difference
@@ -72,9 +73,8 @@ def run(
     taught = data.choose([n for n in data.names if n not in held])
     fit = calibrate(residual, chosen, taught, method=method, progress=progress)
     values = PARAMETERS.complete(jnp.asarray(fit.values), data.free, data.fixed)
-    printed = jnp.asarray(PARAMETERS.printed)
-    before, after = (np.asarray(rms_difference(v, data)) for v in (printed, values))
-    field_before, field_after = (np.asarray(inflow(v, data)) for v in (printed, values))
+    field_before, field_after = (np.asarray(inflow(v, data)) for v in (jnp.asarray(PARAMETERS.printed), values))
+    before, after = (rms_difference(field, data) for field in (field_before, field_after))
     about = {
         "radial_terms": int((data.model.modes.m == 0).sum()),
         "source_terms": int((data.model.sources.m == 0).sum()),

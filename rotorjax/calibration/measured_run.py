@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 
 from rotorjax.bench.settings import study_settings
 from rotorjax.calibration.calibration_file import Calibration
-from rotorjax.calibration.fit import Fit, Progress, conclude, judge
+from rotorjax.calibration.drivers import Progress
+from rotorjax.calibration.fit import Fit, conclude, judge
 from rotorjax.calibration.measured import (
     COLLECTIVE_DEG,
     MARGINS,
@@ -142,17 +143,15 @@ def run(
 
 def _fit(chosen: ParameterSet, values, end, jacobian, history, wall: float, compiled: float) -> Fit:
     """The verdict on a fit, from the residual and its derivative at the end."""
-    line = jnp.asarray(end), jnp.asarray(jacobian), jnp.asarray(values)
-    verdict = judge(_line, chosen, line, jnp.asarray(values))
+    verdict = judge(chosen, end, jacobian)
     converged, why = conclude(chosen, values, verdict)
     at_bound = chosen.at_bound(values)
-    covariance = np.asarray(verdict.covariance)
     method = "trust region, exact derivatives"
     return Fit(
         chosen,
         values,
-        float(verdict.rms),
-        covariance,
+        verdict.rms,
+        verdict.covariance,
         converged,
         why,
         at_bound,
@@ -161,11 +160,6 @@ def _fit(chosen: ParameterSet, values, end, jacobian, history, wall: float, comp
         wall,
         compiled,
     )
-
-
-def _line(values, line):
-    end, jacobian, at = line
-    return end + jacobian @ (values - at)
 
 
 def report(result: MeasuredRun) -> str:

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
+from scipy.special import expit
 
 from rotorjax.errors import InputError
 
@@ -77,16 +78,20 @@ class ParameterSet:
             raise InputError(f"Argument `parameters` must be among {', '.join(self.names)}, but holds {unknown[0]!r}")
         return ParameterSet(self.name, tuple(p for p in self.parameters if p.name in names))
 
-    def bounded(self, z: Float[Array, "*N P"]) -> Float[Array, "*N P"]:
+    def bounded(self, z: Float[Array | np.ndarray, "*N P"]) -> Float[Array, "*N P"]:
         """Values of unbounded coordinates."""
         return jnp.asarray(self.lower) + (self.upper - self.lower) * jax.nn.sigmoid(z)
 
-    def unbounded(self, values: Float[Array, "*N P"]) -> Float[Array, "*N P"]:
+    def unbounded(self, values: Float[np.ndarray, "*N P"]) -> Float[np.ndarray, "*N P"]:
         """Coordinates of values inside the range; the inverse of `bounded`."""
-        share = (jnp.asarray(values) - self.lower) / (self.upper - self.lower)
-        return jnp.log(share) - jnp.log1p(-share)
+        share = (np.asarray(values) - self.lower) / (self.upper - self.lower)
+        return np.log(share) - np.log1p(-share)
 
-    def check(self, values: ArrayLike, name: str = "start") -> Float[Array, "*N P"]:
+    def slopes(self, z: Float[np.ndarray, "*N P"]) -> Float[np.ndarray, "*N P"]:
+        """Derivative of `bounded`, value by value."""
+        return (self.upper - self.lower) * expit(z) * expit(-z)
+
+    def check(self, values: ArrayLike, name: str = "start") -> Float[np.ndarray, "*N P"]:
         """Return values as an array. Raises InputError where one is not finite, not inside its range, or missing."""
         array = np.asarray(values, float)
         if array.ndim == 0 or array.shape[-1] != len(self):
@@ -97,7 +102,7 @@ class ParameterSet:
             column = array[..., i]
             if bad := [v for v in column.ravel() if not (isfinite(v) and p.lower < v < p.upper)]:
                 raise InputError(f"Argument `{p.name}` must lie inside ({p.lower:g}, {p.upper:g}), but is {bad[0]:g}")
-        return jnp.asarray(array)
+        return array
 
     def at_bound(self, values: Float[Array, " P"] | np.ndarray) -> tuple[str, ...]:
         """Names of the parameters within AT_BOUND of their range from a bound."""

@@ -145,10 +145,12 @@ def inflow(values: Float[Array, " P"], data: Lessons) -> Float[Array, "C K R"]:
     return jax.vmap(one)(data.heights, data.slopes, data.over_ground, data.tau)
 
 
-@eqx.filter_jit
-def rms_difference(values: Float[Array, " P"], data: Lessons) -> Float[Array, " C"]:
-    """Return the area-weighted rms difference of each case from the free wake, as the study's inflow_rms_difference."""
-    return jnp.sqrt(jnp.einsum("ckr,r->c", (inflow(values, data) - data.inflow) ** 2, data.weights))
+def rms_difference(found: Float[np.ndarray, "C K R"], data: Lessons) -> Float[np.ndarray, " C"]:
+    """Return each case's area-weighted rms difference from the free wake, as the study's inflow_rms_difference.
+
+    found: as `inflow` returns it.
+    """
+    return np.sqrt(np.einsum("ckr,r->c", (found - np.asarray(data.inflow)) ** 2, np.asarray(data.weights)))
 
 
 @eqx.filter_jit

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from rotorjax.deck.blades import SectionBlades, stations
 from rotorjax.deck.case import DeckCase
 from rotorjax.deck.march import History, simulate
-from rotorjax.deck.over_ground import Controls, Output, OverGround, controls, output, over_ground, trim
+from rotorjax.deck.over_ground import Controls, Output, OverGround, RotorState, controls, output, over_ground, trim
 from rotorjax.deck.tip_path import tip_path
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
@@ -105,7 +105,7 @@ def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
     if not bool(jnp.all(jnp.isfinite(history.outputs.thrust))):
         raise InputError("Argument `steps_per_turn` must be larger: the march left finite numbers")
     kept = jax.tree.map(lambda v: v[::every], given)
-    steady = _static(case, kept)
+    steady = _static(case, model, kept, start)
     data = _dataset(case, model, history, kept, steady)
     figures = {
         "build_s": built,
@@ -118,7 +118,7 @@ def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
     return data, figures
 
 
-def _trimmed(model: OverGround, first: Controls, case: DeckCase):
+def _trimmed(model: OverGround, first: Controls, case: DeckCase) -> RotorState:
     still = eqx.tree_at(lambda c: (c.ground.height_rate, c.ground.slope_rate), first, (jnp.zeros(()),) * 2)
     try:
         state = trim(model, _without_climb(still))
@@ -134,21 +134,22 @@ def _without_climb(now: Controls) -> Controls:
     return eqx.tree_at(lambda c: (c.climb, c.climb_rate), now, (jnp.zeros_like(now.climb),) * 2)
 
 
-def _static(case: DeckCase, kept: Controls) -> Output:
-    """What the rotor does in the steady state of each instant's geometry."""
-    model, _, _ = build(case, "static")
+def _static(case: DeckCase, model: OverGround, kept: Controls, start: RotorState) -> Output:
+    """What the rotor does in the steady state of each instant's geometry; start: the one at the first."""
+    if model.transport is None:  # the same table
+        still = over_ground(model.rotor, model.table, model.blades, "static", None, model.at, model.tip_path)
+    else:
+        still = build(case, "static")[0]
 
     @jax.jit
     def march(guess: Array) -> tuple:
         def one(a: Array, now: Controls) -> tuple[Array, Output]:
-            state = trim(model, now, a)
-            return state.a, output(jnp.zeros(()), state, now, model)
+            state = trim(still, now, a)
+            return state.a, output(jnp.zeros(()), state, now, still)
 
-        return jax.lax.scan(one, guess, kept)
+        return jax.lax.scan(one, guess, _without_climb(kept))
 
-    kept = _without_climb(kept)
-    first = jax.tree.map(lambda v: v[0], kept)
-    return march(_trimmed(model, first, case).a)[1]
+    return march(start.a)[1]
 
 
 def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls, steady: Output) -> xr.Dataset:

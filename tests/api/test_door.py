@@ -42,7 +42,7 @@ def test_what_is_offered_is_there():
 
 
 def test_it_opens_without_loading_the_house_or_touching_jax():
-    code = "import sys, rotorjax; sys.exit(bool({'jax', 'matplotlib', 'xarray', 'optax'} & set(sys.modules)))"
+    code = "import sys, rotorjax; sys.exit(bool({'jax', 'matplotlib', 'xarray', 'optimistix'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
     code = "import sys, jax, rotorjax as rj; rj.free_wake, rj.solve; sys.exit(jax.config.jax_enable_x64)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

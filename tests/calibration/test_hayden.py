@@ -1,12 +1,17 @@
 """Hayden's factor, and the wake's radius and clearance fitted to it."""
 
+import json
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from rotorjax.calibration import hayden
+from rotorjax.calibration import hayden, hayden_run
+from rotorjax.calibration.calibration_file import load
 from rotorjax.calibration.fit import calibrate, calibrate_many, even_starts
+from rotorjax.cli import main
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.potential import loading
@@ -96,6 +101,28 @@ def test_every_start_ends_at_the_same_place(both):
     many = calibrate_many(hayden.residual, parameters, data, even_starts(parameters, 4))
     np.testing.assert_allclose(many.values, np.tile(fit.values, (4, 1)), atol=1e-5)
     assert many.converged.all()
+
+
+@pytest.mark.slow
+def test_the_command_writes_everything(tmp_path, capsys, monkeypatch):
+    """With two of three drivers and four starts."""
+    fewer = partial(hayden_run.run, drivers=("least_squares", "lbfgs"), starts=4)
+    monkeypatch.setattr(hayden_run, "run", fewer)
+    out = tmp_path / "out"
+    assert main(["calibrate", "hayden", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    found = json.loads((out / "calibration.json").read_text())
+    assert found["converged"]
+    assert found["rms_error"] <= 0.02 < found["rms_error_printed_factor"]
+    assert found["largest_difference_of_drivers"] <= 1e-4
+    assert found["starts"]["converged"] == 4
+    assert found["starts"]["spread"] < 1e-5
+    assert len(found["covariance"]) == 2
+    saved = load(out / "calibration.toml")
+    assert saved.parameters == pytest.approx({n: found[n] for n in ("radius", "clearance")})
+    assert (out / "hayden.png").stat().st_size > 10000
+    assert "default" in printed
+    assert "converged: " in printed
 
 
 def test_measured_loads_are_brought_to_one_thrust():

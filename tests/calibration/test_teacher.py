@@ -1,7 +1,9 @@
 """Lessons read off a study whose answer is known."""
 
+import json
+from functools import partial
+
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -9,8 +11,11 @@ from known_study import TRUTH, known_study
 
 from rotorjax.bench.record import rms_difference
 from rotorjax.calibration import freewake_run, teacher
-from rotorjax.calibration.fit import calibrate
+from rotorjax.calibration.calibration_file import load
+from rotorjax.calibration.drivers import linearised
+from rotorjax.calibration.fit import conclude, judge
 from rotorjax.calibration.taught import PARAMETERS
+from rotorjax.cli import main
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 
@@ -49,15 +54,51 @@ def test_out_of_ground_effect_ignores_the_ground(taught):
     assert np.max(np.abs(fields[1] - taught.inflow_printed[1])) > 0.1
 
 
+def verdict_on(data, values):
+    """From one evaluation with its Jacobian, by the program of the fit."""
+    return judge(PARAMETERS, *map(np.asarray, linearised(teacher.residual, values, data)))
+
+
 def test_covariance_shrinks_as_the_noise_does(taught):
-    """A few steps from the truth, which is near: the deviations are those of where they end."""
+    """At the truth, which the ends of fits are near."""
 
     def deviations(noise):
-        data, parameters = teacher.lessons(known_study(noise))
+        data, _ = teacher.lessons(known_study(noise))
         lessons = data.choose([name for name in data.names if name not in taught.held])
-        return calibrate(teacher.residual, parameters, lessons, PARAMETERS.vector(TRUTH), max_steps=4).deviations
+        return np.sqrt(np.diag(verdict_on(lessons, PARAMETERS.vector(TRUTH)).covariance))
 
     np.testing.assert_allclose(deviations(1e-2) / deviations(1e-3), 10, rtol=0.1)
+
+
+def test_level_cases_cannot_teach_the_slope(taught, study):
+    """Reported, not made up; what was not to be fitted keeps its printed value."""
+    lessons = taught.data.choose([name for name in taught.data.names if name not in taught.held])
+    level = eqx.tree_at(lambda d: d.slopes, lessons, jnp.zeros_like(lessons.slopes))
+    converged, why = conclude(PARAMETERS, np.asarray(taught.values), verdict_on(level, jnp.asarray(taught.values)))
+    assert not converged
+    assert "do not determine" in why
+    fewer, chosen = teacher.lessons(study, ("mean_gain", "slope_share"))
+    values = PARAMETERS.complete(jnp.asarray([1.2, 0.5]), fewer.free, fewer.fixed)
+    kept = [PARAMETERS.names.index(n) for n in PARAMETERS.names if n not in chosen.names]
+    np.testing.assert_array_equal(values[np.array(kept)], PARAMETERS.printed[kept])
+
+
+@pytest.mark.slow
+def test_the_command_writes_a_picture_of_every_held_out_case(taught, study, tmp_path, capsys, monkeypatch):
+    """With the programs of the fit above."""
+    monkeypatch.setattr(freewake_run, "gradient_cost", partial(freewake_run.gradient_cost, repeats=1))
+    netcdf.write(tmp_path / "cases.nc", study)
+    out = tmp_path / "out"
+    assert main(["calibrate", "freewake", "--cases", str(tmp_path), "--out", str(out)]) == 0
+    found = json.loads((out / "calibration.json").read_text())
+    assert found["held_out"]["halved"]
+    assert found["parameters"]["radius"] == pytest.approx(0.82, rel=1e-4)
+    assert len(found["parameters"]) <= 8
+    assert found["gradient_cost"]["gradient_s"] > 0
+    pictures = {p.name for p in out.glob("*.png")}
+    assert pictures == {"rms.png"} | {f"held_{name}.png" for name in found["held_out"]["cases"]}
+    assert load(out / "calibration.toml").set == "freewake"
+    assert "at least halved" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -67,10 +108,7 @@ def test_gradient_of_the_objective_costs_less_than_four_evaluations(study):
     level = data.choose([n for n in data.names if "slope" not in n])
     start = jnp.asarray(parameters.printed)
 
-    def objective(v, d):
-        return jnp.sum(teacher.residual(v, d) ** 2)
-
-    plain, gradient = (eqx.filter_jit(f).lower(start, level) for f in (objective, jax.value_and_grad(objective)))
+    plain, gradient = (f.lower(start, level) for f in (freewake_run._objective, freewake_run._gradient))
     flops = [f.compile().compiled.cost_analysis()["flops"] for f in (plain, gradient)]
     assert 1 < flops[1] / flops[0] <= 4
 
@@ -110,14 +148,3 @@ def test_a_file_that_is_no_study_is_refused(study, tmp_path):
         teacher.find_cases(tmp_path / "other.nc")
     with pytest.raises(InputError, match="must be readable"):
         teacher.find_cases(tmp_path / "missing.nc")
-
-
-@pytest.mark.slow
-def test_level_cases_cannot_teach_the_slope(study):
-    """Reported, not made up; what was not to be fitted keeps its printed value."""
-    slopes = tuple(str(n) for n in study["case"].to_numpy() if "slope" in n)
-    result = freewake_run.run(study, ("mean_gain", "slope_share"), held=slopes)
-    assert not result.fit.converged
-    assert "do not determine" in result.fit.why
-    kept = [PARAMETERS.names.index(n) for n in ("radius", "length", "clearance", "third_gain")]
-    np.testing.assert_array_equal(result.values[kept], PARAMETERS.printed[kept])

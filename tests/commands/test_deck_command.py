@@ -59,7 +59,8 @@ def test_landing_writes_everything(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_flight_over_an_edge_with_flapping_blades(tmp_path, capsys):
+def test_flight_over_an_edge_with_flapping_blades(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("rotorjax.bench.plotting.save", lambda figure, stem: [])  # the landing's are looked at
     out = tmp_path / "out"
     path = case(tmp_path, "dynamic", 4.0, "edge = [-1.4, 0.6]", "uh60")
     assert main(["deck", "--case", str(path), "--out", str(out)]) == 0
