@@ -18,12 +18,13 @@ import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, save_file, style
-from rotorjax.frames import rotate_about_shaft
+from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 from rotorjax.region import half_plane
+from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.field import at_instants, velocity, wake_segments
 from rotorjax.wake.model import azimuths
@@ -63,39 +64,39 @@ def moments(solved):
 
 
 def limits(quick: bool) -> dict:
-    """A flat patch of panels under the wake over a plane, frozen, against the plane's image.
+    """A flat patch of panels against the image: of a vortex ring, and of the wake over a plane as it is.
 
-    Sources and image are the same for a potential flow above the plane, which a filament that fades and a wide core are
-    not: the wake as it was solved, and the same places with strengths that last and cores of 0.01 R.
+    Sources and image are the same for a potential flow, which a ring's is; a wake's filaments fade, end and have cores.
     """
     solved = rj.solve(wake(ground=rj.plane(HEIGHT), quick=quick))
-    state = jax.tree.map(jnp.asarray, solved.found.state)
-    names = ("inboard_decay", "mixing", "spreading", "turbulence", "tip_core", "inboard_core", "near_core")
-    numbers = [jnp.zeros(())] * 4 + [jnp.asarray(0.01)] * 3
-    lasting = eqx.tree_at(lambda m: [getattr(m.settings, n) for n in names], solved.found.model, numbers)
+    model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
+    bare = eqx.tree_at(lambda m: m.ground, model, None)
+    segments, angles = wake_segments(model, state), azimuths(state)
+    corners = disk_points(jnp.full(145, 0.8), jnp.linspace(0, 2 * jnp.pi, 145)) - jnp.array([0, 0, 0.5])
+    ring = corners[:-1], corners[1:], jnp.ones(144), jnp.full(144, 0.01)
+
+    def of_wake(points, plane):
+        return at_instants(bare if plane is None else model, segments, points[None], angles)[0]
+
+    def of_ring(points, plane):
+        return segment_velocity(points, *ring, plane=plane)
+
     rows = []
-    for name, model in (("as solved", solved.found.model), ("strengths last", lasting)):
+    for name, flow in (("ring", of_ring), ("wake", of_wake)):
         for panel in (0.25, 0.125) if quick else (0.3, 0.2, 0.1):
-            rows.append({"wake": name, "panel": panel} | against_image(model, state, panel))
+            rows.append({"of": name, "panel": panel} | against_image(jax.jit(flow), panel))
             print(json.dumps({"flat patch against image": rows[-1]}), flush=True)
     return {"patch": rows}
 
 
-def against_image(model, state, panel: float) -> dict:
+def against_image(flow, panel: float) -> dict:
     """Upflow on the disk of a patch 16 R square against the image's: how far off in the mean, and at worst."""
-    segments, angles = wake_segments(model, state), azimuths(state)
-    bare = eqx.tree_at(lambda m: m.ground, model, None)
     r, psi = np.meshgrid(np.sqrt((np.arange(6) + 0.5) / 6), 2 * np.pi / 16 * np.arange(16))
-    disk = jnp.asarray(np.stack([r * np.cos(psi), r * np.sin(psi), 0 * r], axis=-1).reshape(-1, 3))
-
-    @jax.jit
-    def flow(points, which):
-        return at_instants(which, segments, points[None], angles)[0]
-
-    image = (flow(disk, model) - flow(disk, bare))[:, 2]
+    disk = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
+    image = (flow(disk, rj.plane(HEIGHT)) - flow(disk, None))[:, 2]
     flat = rj.slab((-8, -8), (8, 8), -HEIGHT, 0.5, panel)
     top = Panels(flat.corners[np.asarray(flat.normals)[:, 2] > 0.5])
-    normal = jnp.sum(flow(top.middles, bare) * top.normals, axis=1)
+    normal = jnp.sum(flow(top.middles, None) * top.normals, axis=1)
     found = panel_velocity(disk, top.corners, -2 * normal)[:, 2]  # panels of one plane leave each other alone
     mean = float(jnp.mean(found) / jnp.mean(image) - 1)
     most = float(jnp.max(jnp.abs(found - image)) / jnp.max(jnp.abs(image)))
