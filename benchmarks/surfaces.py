@@ -180,7 +180,7 @@ def roof(quick: bool) -> list[dict]:
         for one in (rj.solve(wake(ground=ground, quick=quick)) for ground in (None, rj.plane(HEIGHT)))
     )
     print(json.dumps({"inflow over whole ground, over that in free air": whole / alone}), flush=True)
-    house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.5 if quick else 0.35)
+    house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.3 if quick else 0.25)
     for edge in (3.0, *PLACES[::-1]):
         house = house_at_hub.moved((float(edge), 0, 0))
         began = time.perf_counter()
@@ -263,7 +263,7 @@ def draw_roof(rows: list[dict], path: Path) -> None:
                 edge[ok], [row[name] / row["CT"] for row, good in zip(rows, ok, strict=True) if good], "o-", label=label
             )
         second.set(xlabel="edge of the roof aft of the hub, x/R", ylabel="hub moment over $C_T$")
-        second.legend()
+        second.legend(loc="upper right", bbox_to_anchor=(1.0, 0.75))
     save_file(figure, path)
 
 
