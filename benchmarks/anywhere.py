@@ -9,8 +9,8 @@ clearance of 0.05 R, collective for 3 % … 120 % of the design thrust C_T/σ = 
 Case i of a seed is the same whatever n is. --jobs shares the cases among processes with cores of their own, which give
 each other compiled programs where JAX_COMPILATION_CACHE_DIR is set; the file is written anew after every case, and a
 run that is ended (SIGTERM, Ctrl-C) sums up what it has. Prints the share that converged, median and 95 % of the seconds
-after compilation (tracing counts as solving), and each failure: where it ended, with what residual, and how good its
-loads are all the same.
+after compilation (tracing counts as solving), those of the processor, and each failure: where it ended, with what
+residual, and how good its loads are all the same.
 """
 
 import argparse
@@ -145,7 +145,7 @@ def row_of(part: str, i: int, seed: int, quick: bool, progress: Any = None) -> d
     """A case, solved."""
     draw, solved = PARTS[part]
     case = draw(i, np.random.default_rng([seed, list(PARTS).index(part), i]))
-    clock = Clock()
+    clock, busy = Clock(), time.process_time()
     try:
         found = solved(case, quick)
     except Exception as problem:  # one case must not end the others
@@ -153,7 +153,7 @@ def row_of(part: str, i: int, seed: int, quick: bool, progress: Any = None) -> d
         found = {"converged": False, "verdict_text": repr(problem), "iterations": 0} | nothing
     wall, compiling = clock.read()
     row = {"part": part, "case": i, **case, **found, "solve_s": wall - compiling, "compile_s": compiling}
-    return row | {"load_average": os.getloadavg()[0]}
+    return row | {"busy_s": time.process_time() - busy, "load_average": os.getloadavg()[0]}
 
 
 def solved_cases(pool: Pool, chosen: argparse.Namespace) -> Iterator[dict[str, Any]]:
@@ -188,7 +188,10 @@ def line(row: dict[str, Any]) -> str:
     else:
         where = f"{where}, slope {row['slope_deg']:.2f}°, {100 * row['share']:.0f} % thrust"
     end = "converged" if row["converged"] else f"NOT converged: {row['verdict_text']}"
-    took = f"{row['solve_s']:.1f} s and {row['compile_s']:.1f} s compiling, {row['iterations']} iterations"
+    took = (
+        f"{row['solve_s']:.1f} s and {row['compile_s']:.1f} s compiling ({row['busy_s']:.1f} s of the processor), "
+        f"{row['iterations']} iterations"
+    )
     return f"{row['part']} {row['case']}: {row['rotor']}, {where}: residual {row['residual']:.1e}, {took}, {end}"
 
 
@@ -202,6 +205,7 @@ def summary(part: str, rows: list[dict[str, Any]]) -> str:
     said = (
         f"{part}: {len(good)} of {len(here)} converged ({100 * len(good) / len(here):.1f} %); "
         f"median {np.median(seconds):.1f} s, 95 % {np.percentile(seconds, 95):.1f} s, most {max(seconds):.1f} s; "
+        f"of the processor, compiling included, median {np.median([row['busy_s'] for row in here]):.1f} s; "
         f"mean load {np.mean([row['load_average'] for row in here]):.1f} on {os.cpu_count()} cores"
     )
     return "\n".join([said, *(f"  {line(row)}" for row in here if not row["converged"])])

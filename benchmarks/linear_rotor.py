@@ -10,33 +10,40 @@ Prints, for each inflow and flight:
 
 5. with --wake, the free wake at μ = .15: seconds of each stage from the trim on (compilation in the first of each),
    peak memory, the errors of 2 and 3, those of the condensed model, and the leading exponents.
+6. with --table, an inflow identified over μ and h from the linear free wake (coarse wakes), its error over a revolution
+   beside Pitt and Peters' own, and at a flight held out; and there the matrices between those of two other flights.
 
-    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--json FILE]
+    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--table] [--json FILE]
 """
 
 import argparse
 import json
 import resource
 import time
+from dataclasses import replace
 
 import equinox as eqx
 import jax
 import numpy as np
 
-from rotorjax.linearisation import flight, rotor, steps
+from rotorjax.linearisation import flight, identified, rotor, steps, wake_flight
 from rotorjax.linearisation.compact import compact, frequencies
+from rotorjax.linearisation.condensed import aligned
+from rotorjax.linearisation.found import CONTROLS, OUTPUTS, Wanted
 from rotorjax.linearisation.modes import modes
 from rotorjax.linearisation.sensitivity import sensitivity
 from rotorjax.ode.harmonic import average
 from rotorjax.ode.hill import harmonic_transfer
 from rotorjax.trim.run import request, run
 from rotorjax.trim.solve import trim
+from rotorjax.wake.settings import flight_settings
 
 THRUST = 0.00575
 FLIGHTS = {"hover": {}, "h = 1": {"height": 1.0}, "μ = .15": {"advance": 0.15}, "μ = .3": {"advance": 0.3}}
 STEPPED = ("theta_0", "theta_1c", "w", "q")
 PAIRS = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"))
 MAIN = ("CT", "L", "M", "beta_0", "beta_1c", "beta_1s", "lambda_0", "lambda_1c", "lambda_1s")
+COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0}
 PARAMETERS = {
     "hinge offset": (lambda design: design[1].blade.offset, 1e-5),
     "density over inertia": (lambda design: design[1].blade.air, 1e-4),
@@ -55,14 +62,14 @@ def row(inflow, name, order):
     """One flight."""
     result, trim_s = timed(lambda: run(request("uh60", THRUST, inflow, **FLIGHTS[name])))
     base = rotor.base_of(result.trimmed)
-    _, first_s = timed(lambda: rotor.linear_rotor(base, flight.CONTROLS, flight.OUTPUTS))
-    model, again_s = timed(lambda: rotor.linear_rotor(base, flight.CONTROLS, flight.OUTPUTS))
+    _, first_s = timed(lambda: rotor.linear_rotor(base, CONTROLS, OUTPUTS))
+    model, again_s = timed(lambda: rotor.linear_rotor(base, CONTROLS, OUTPUTS))
     truth = harmonic_transfer(model, frequencies())[:, 0]
     found, modes_s = timed(lambda: modes(model))
     small, reduce_s = timed(lambda: compact(average(model), order, truth))
     where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
     names = STEPPED + (("height",) if result.request.height else ())
-    stepped = rotor.linear_rotor(base, names, flight.OUTPUTS)
+    stepped = rotor.linear_rotor(base, names, OUTPUTS)
     sizes = [steps.size_of(n) for n in names]
     error = steps.largest_gap(steps.marched(base, names, stepped.outputs), steps.modelled(stepped, sizes))
     main = [stepped.outputs.index(n) for n in MAIN]
@@ -89,7 +96,7 @@ def row(inflow, name, order):
 
 def wake_row(order):
     """The free wake in forward flight."""
-    found = flight.linearise_flight(request("uh60", THRUST, "freewake", advance=0.15), flight.Wanted(order=order))
+    found = flight.linearise_trim(request("uh60", THRUST, "freewake", advance=0.15), Wanted(order=order))
     if not isinstance(found, flight.LinearFlight):
         raise SystemExit(f"freewake, μ = .15: {found.trimmed.outcome.why}")
     model, wake = found.periodic, found.wake
@@ -114,6 +121,65 @@ def wake_row(order):
     }
 
 
+def in_wake(advance, height, near):
+    """Trim, condensed model, basis and unit steps of a flight in a coarse free wake, from a flight nearby."""
+    wanted = request("uh60", THRUST, "freewake", advance=advance, height=height)
+    result = run(replace(wanted, wake=flight_settings(4, **COARSE)), near and near[0].trimmed)
+    base = wake_flight.base_in_flight(rotor.base_of(result.trimmed), rotor.AZIMUTHS)
+    model = wake_flight.all_states(base, identified.INPUTS, (*identified.OUTPUTS, "lambda_0"))
+    small, truth = wake_flight.condense(model, base, near and near[1].model)
+    return result, small, truth
+
+
+def table_rows(speeds, heights, held):
+    """Errors of an inflow identified over a grid, in it and at a flight held out, beside Pitt and Peters' own."""
+    found, flown, near = [], {}, None
+    for height in heights:
+        for advance in speeds:
+            near, took = timed(lambda mu=advance, h=height, n=near: in_wake(mu, h, n))
+            flown[advance, height] = near
+            found.append(identified.identified(*with_pitt_peters(near[1], advance, height), advance, height or np.inf))
+            print(
+                f"identified at μ = {advance:g}, h = {height or np.inf:g}: error {100 * found[-1].error:.1f} %, "
+                f"Pitt and Peters {100 * found[-1].pitt_peters_error:.1f} %; {took:.0f} s",
+                flush=True,
+            )
+    data = identified.table(found)
+    print(identified.text(data))
+    advance, height = held
+    there = in_wake(advance, height, near)
+    model, linear, start = with_pitt_peters(there[1], advance, height)
+    target = identified.target_of(model, linear)
+    between = identified.interpolated(data, advance, height or np.inf)
+    errors = [identified.error_of(inflow, start, target, linear) for inflow in (between, start)]
+    print(f"held out μ = {advance:g}, h = {height or np.inf:g}: {100 * errors[0]:.1f} %, Pitt and Peters' own", end=" ")
+    print(f"{100 * errors[1]:.1f} %")
+    return {"text": identified.text(data), "held_out": held, "error": errors[0], "pitt_peters_error": errors[1]} | (
+        matrices_between([flown[speed, height] for speed in speeds if (speed, height) in flown], there)
+    )
+
+
+def with_pitt_peters(small, advance, height):
+    """The mean model of a wake, that of the same flight with Pitt and Peters' inflow, and that inflow's own."""
+    trimmed = run(request("uh60", THRUST, "pitt-peters", advance=advance, height=height)).trimmed
+    return average(small.model), average(rotor.linear_rotor(rotor.base_of(trimmed))), identified.own(trimmed)
+
+
+def matrices_between(ends, there):
+    """Error of steps by matrices half way between those of the first and last flight, beside the condensed model's."""
+    if len(ends) < 2:
+        return {}
+    one, two = aligned([ends[0][1], ends[-1][1]])
+    middle = replace(one, **{name: (getattr(one, name) + getattr(two, name)) / 2 for name in "abcd"})
+    truth, errors = there[2], {}
+    for name, model in (("condensed", there[1].model), ("between", middle), ("first", one)):
+        own = np.stack([model.step(column)[1] for column in np.eye(len(model.inputs))], axis=-1)
+        gap = steps.largest_gap(truth, own)
+        errors[name] = {"median": float(np.median(gap)), "CT/theta_0": float(gap[0, 0])}
+    print("a revolution after a step, over the largest response, by", errors)
+    return {"between": errors}
+
+
 def derivatives(trimmed):
     """Largest gap of the exponents' derivatives from central differences, over the largest derivative."""
     gaps = {}
@@ -131,9 +197,10 @@ def derivatives(trimmed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--inflow", nargs="+", default=["pitt-peters"])
+    parser.add_argument("--inflow", nargs="*", default=["pitt-peters"])
     parser.add_argument("--order", type=int, default=20)
     parser.add_argument("--wake", action="store_true", help="the free wake in forward flight too, some minutes")
+    parser.add_argument("--table", action="store_true", help="an identified inflow over μ and h, some minutes")
     parser.add_argument("--json", help="file to write")
     chosen = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
@@ -156,9 +223,10 @@ def main():
     if chosen.wake:
         rows.append(wake_row(chosen.order))
         print(json.dumps(rows[-1], indent=1, ensure_ascii=False))
+    table = table_rows((0.1, 0.2), (None, 1.0), (0.15, None)) if chosen.table else {}
     if chosen.json:
         with open(chosen.json, "w") as file:
-            json.dump({"flights": rows, "derivatives": found}, file, indent=1)
+            json.dump({"flights": rows, "derivatives": found, "identified": table}, file, indent=1)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ What the door offers is imported when it is first asked for; `jax.config` is lef
 from importlib import import_module
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _DOOR = {  # name: room, and what it is called there if not the same
     "finite_state": "rotorjax.api.models",
@@ -39,6 +39,11 @@ _DOOR = {  # name: room, and what it is called there if not the same
     "make_rotor": "rotorjax.rotor.geometry:rotor",
     "free_wake": "rotorjax.wake.model",
     "several_wakes": "rotorjax.wake.several",
+    "box": "rotorjax.panels.shapes",
+    "slab": "rotorjax.panels.shapes",
+    "wall": "rotorjax.panels.shapes",
+    "terrain": "rotorjax.panels.shapes",
+    "read_stl": "rotorjax.panels.stl",
     "WakeSettings": "rotorjax.wake.settings",
     "flight_settings": "rotorjax.wake.settings",
     "hover_settings": "rotorjax.wake.settings",

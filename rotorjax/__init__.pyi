@@ -19,6 +19,11 @@ from rotorjax.ode.export import save_mat as save_mat
 from rotorjax.ode.export import to_control as to_control
 from rotorjax.operating import OperatingPoint as OperatingPoint
 from rotorjax.operating import operating_point as operating_point
+from rotorjax.panels.shapes import box as box
+from rotorjax.panels.shapes import slab as slab
+from rotorjax.panels.shapes import terrain as terrain
+from rotorjax.panels.shapes import wall as wall
+from rotorjax.panels.stl import read_stl as read_stl
 from rotorjax.potential.model import steady_state
 from rotorjax.rotor.catalogue import names as names
 from rotorjax.rotor.geometry import rotor as _rotor

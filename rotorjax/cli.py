@@ -30,6 +30,7 @@ def parser() -> argparse.ArgumentParser:
     """The parser of all commands; each module of `rotorjax.commands` registers its own."""
     from rotorjax.commands import (
         calibrate,
+        completion,
         deck,
         doctor,
         inflow,
@@ -45,7 +46,8 @@ def parser() -> argparse.ArgumentParser:
     top = Parser(prog="rotorjax", description="Rotor inflow near the ground: finite-state model and free vortex wake.")
     top.add_argument("--version", action="version", version=f"rotorjax {__version__}")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
-    for module in (study, inflow, trim, sweep, simulate, linearise, validate, calibrate, deck, new, doctor):
+    modules = (study, inflow, trim, sweep, simulate, linearise, validate, calibrate, deck, new, doctor, completion)
+    for module in modules:
         module.register(commands)
     return top
 

@@ -50,14 +50,14 @@ def linearise(
     order: int | None = None,
     time: "Time" = "azimuth",
 ) -> "LinearModel | PeriodicModel":
-    """Linearise the equations that are marched, about a trim with an inflow model, a trimmed flight in the free wake
-    (condensed to a hundred states beside the blades') or a rigid rotor's hovering wake.
+    """Linearise the equations that are marched, about a trim with an inflow model, a trim in the free wake (in flight
+    condensed to a hundred states beside the blades', in hover all that the inputs reach) or a rigid rotor's wake.
 
     inputs, outputs: names (`linearisation.drive`, `.readings` have them), None for all. harmonics: those that the
     time-invariant model keeps, (0,) for the mean; None for the model that is periodic in azimuth. order: states of a
-    reduced model of a trim, which keeps those of the blades. time: "azimuth" (rad, rotor units) or "seconds" (SI).
-    Raises InputError where it has not converged, a name is unknown or the order too low, and for a hover trimmed in the
-    free wake (`linearisation.hover_flight` has it) or with the finite-state model alone.
+    reduced model of a trim, which keeps those of the blades; in the hovering free wake, which grows, it is for one
+    revolution. time: "azimuth" (rad, rotor units) or "seconds" (SI). Raises InputError where it has not converged, a
+    name is unknown, the order too low or there are harmonics of what has none, and for the finite-state model alone.
 
     >>> import rotorjax as rj
     >>> hover = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", azimuths=8)
@@ -66,6 +66,7 @@ def linearise(
     """
     from rotorjax.linearisation.compact import reduced
     from rotorjax.linearisation.handover import handed_over
+    from rotorjax.linearisation.hover_flight import hover_in_wake
     from rotorjax.linearisation.rotor import base_of, linear_rotor
     from rotorjax.linearisation.system import linear_wake
     from rotorjax.linearisation.wake_flight import periodic_in_wake
@@ -80,12 +81,19 @@ def linearise(
         periodic, flown = linear_wake(about.found, named(inputs), named(outputs)), about.model
     elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
         periodic, flown = linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
-    elif isinstance(about, Result) and about.request.advance:
+    elif isinstance(about, Result) and not about.request.advance:
+        if harmonics is None or tuple(harmonics) != (0,):
+            raise InputError(
+                "Argument `harmonics` must be (0,) for a hover in the free wake, which does not change with the "
+                f"azimuth, but is {harmonics}"
+            )
+        model = hover_in_wake(about, inputs, outputs, order)
+        return handed_over(model, about.request.rotor, about.request.operating, time)
+    elif isinstance(about, Result):
         periodic, flown = periodic_in_wake(about, named(inputs), named(outputs)), about.request
     else:
         raise InputError(
-            "Argument `about` must be a free wake of rigid blades in hover, a trim with inflow 'uniform', "
-            "'pitt-peters' or 'vpbfsm', or one in forward flight, but is neither of these: trim so"
+            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, but is neither"
         )
     if harmonics is None:
         if order is not None:

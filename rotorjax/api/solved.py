@@ -72,6 +72,8 @@ class Solved(eqx.Module):
         import xarray as xr
 
         around = ("azimuth", "radius")
+        surfaces = self.model.surfaces if isinstance(self.model, FreeWake) else None
+        panels = 0 if surfaces is None else len(surfaces.panels)
         data = xr.Dataset(
             {
                 "inflow": (around, np.asarray(self.inflow), _about("inflow over ΩR, positive down")),
@@ -83,7 +85,7 @@ class Solved(eqx.Module):
                 "azimuth": ("azimuth", np.asarray(self.psi), _about("azimuth, 0 aft, counter-clockwise", "rad")),
                 **{name: ((), value, _about(text, unit)) for name, (value, text, unit) in _place(self.model).items()},
             },
-            attrs={"rotor": self.model.rotor.name, "model": NAMES[type(self.model)], "why": self.why},
+            attrs={"rotor": self.model.rotor.name, "model": NAMES[type(self.model)], "why": self.why, "panels": panels},
         )
         return data.assign(converged=((), int(self.converged), _about("1 where the steady state was found")))
 

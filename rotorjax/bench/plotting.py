@@ -73,12 +73,16 @@ def save(figure: Figure, stem: str | Path, formats: Sequence[str] = ("png", "pdf
 
 def save_file(figure: Figure, path: str | Path) -> None:
     """Write one whole picture, its format from the name's ending; the same picture gives the same file."""
-    ending = Path(path).suffix.lower().removeprefix(".")
+    write_bytes(path, drawn(figure, Path(path).suffix.lower().removeprefix(".")))
+
+
+def drawn(figure: Figure, ending: str = "png") -> bytes:
+    """A picture as the content of a file of a format."""
     metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending, {})
     file = io.BytesIO()
     with style():
         figure.savefig(file, format=ending, metadata=metadata)
-    write_bytes(path, file.getvalue())
+    return file.getvalue()
 
 
 def series_colours(count: int) -> list[Any]:

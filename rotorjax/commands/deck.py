@@ -11,7 +11,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         "deck",
         help="a rotor over a moving deck",
         description="Simulate a rotor over a heaving, pitching deck with the dynamic finite-state model and write "
-        "history.nc, report.json, histories and disk as PNG and PDF, and on request animation.gif. "
+        "history.nc, report.html, report.json, histories and disk as PNG and PDF, and on request animation.gif. "
         "`rotorjax.deck.case` shows a case file.",
     )
     parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
@@ -24,13 +24,11 @@ def run(chosen: argparse.Namespace) -> int:
     """Simulate and write; the exit code."""
     from tqdm import tqdm
 
-    from rotorjax.bench import plotting
     from rotorjax.commands.arguments import introduce
     from rotorjax.deck import output as deck_output
     from rotorjax.deck.case import read_case
     from rotorjax.deck.run import run_case
-    from rotorjax.io import netcdf
-    from rotorjax.io.atomic import make_folder, write_json
+    from rotorjax.io.atomic import make_folder
 
     case = read_case(chosen.case)
     out = make_folder(chosen.out)
@@ -38,15 +36,8 @@ def run(chosen: argparse.Namespace) -> int:
     with tqdm(desc="deck", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
         bar.set_postfix_str("tables and march")
         data, figures = run_case(case)
-        bar.set_postfix_str("pictures")
-        netcdf.write(out / "history.nc", data)
-        found = deck_output.report(data, figures)
-        write_json(out / "report.json", found)
-        plotting.save(deck_output.histories(data), out / "histories")
-        plotting.save(deck_output.snapshots(data), out / "disk")
-        if chosen.gif:
-            bar.set_postfix_str("animation")
-            deck_output.animation(data, out / "animation.gif")
+        bar.set_postfix_str("files")
+        found = deck_output.write_all(data, figures, out, animated=chosen.gif)
     for name in ("height", "uniform", "cosine", "thrust", *deck_output.FLAPPING):
         if name in data:  # rigid blades do not flap
             row = "  ".join(f"{key} {value:9.5f}" for key, value in found["histories"][name].items())

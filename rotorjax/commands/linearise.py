@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from rotorjax.commands.arguments import add_flight, add_place, add_rotor
 
 if TYPE_CHECKING:
-    from rotorjax.linearisation.flight import Wanted
-    from rotorjax.trim.run import Progress, Request, Result
+    from rotorjax.linearisation.found import Wanted
+    from rotorjax.trim.run import Progress, Request
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -24,8 +24,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         "name, linearise.json and report.md; several speeds or heights make a scheduled model. With --inflow freewake: "
         "flap, lag and all states of the wake, over level ground or none; in flight periodic, condensed to a hundred "
         "states; in hover, seen from the hub, a time-invariant model whose wake grows, and the reduced model says for "
-        "which horizon it is, several heights in folders of their own. Without a thrust: the free wake of rigid blades "
-        "at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
+        "which horizon it is, in a folder of its own beside other flights. Without a thrust: the free wake of rigid "
+        "blades at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
     )
     add = parser.add_argument
     add_rotor(parser)
@@ -50,18 +50,16 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 def run(chosen: argparse.Namespace) -> int:
     """Solve or trim, linearise and write; the exit code."""
-    trimmed = chosen.thrust_coefficient is not None or chosen.weight is not None
-    if not trimmed:
-        return _wake(chosen)
-    flies = any(speed for speed in [*(chosen.advance_ratio or []), *(chosen.speed or [])])
-    return _hovers(chosen) if chosen.inflow == "freewake" and not flies else _flights(chosen)
+    rigid = chosen.thrust_coefficient is None and chosen.weight is None
+    return _wake(chosen) if rigid else _trimmed(chosen)
 
 
-def _flights(chosen: argparse.Namespace) -> int:
+def _trimmed(chosen: argparse.Namespace) -> int:
     """Models of a trimmed rotor, at one place or several."""
     from rotorjax.commands.arguments import introduce
     from rotorjax.io.atomic import make_folder
-    from rotorjax.linearisation import flight, flight_output, schedule
+    from rotorjax.linearisation import flight, schedule, trim_output
+    from rotorjax.trim.run import Result
 
     usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
     _refuse(chosen, usual, "belongs to a free wake, or to one of rigid blades")
@@ -72,59 +70,24 @@ def _flights(chosen: argparse.Namespace) -> int:
     introduce(requests[0].rotor, requests[0].operating, moves=True)
     with _progress_bar() as progress:
         found = schedule.flights(requests, wanted, progress)
-    flown = [one for one in found if isinstance(one, flight.LinearFlight)]
-    lost = [one for one in found if not isinstance(one, flight.LinearFlight)]
+    lost = [one for one in found if isinstance(one, Result)]
+    known = [one for one in found if not isinstance(one, Result)]
     if len(requests) == 1:
-        for one in flown:
-            flight_output.write(one, out, chosen.time)
-    elif flown:
-        schedule.write(flown, out, chosen.time)
-    return _told([flight_output.lines(one) for one in flown], lost, out)
-
-
-def _hovers(chosen: argparse.Namespace) -> int:
-    """Models of a rotor in its free wake in hover, at one height or several, each in a folder of its own."""
-    from rotorjax.commands.arguments import introduce
-    from rotorjax.io.atomic import make_folder
-    from rotorjax.linearisation import hover_flight, hover_output
-
-    _refuse(chosen, {"collective": None, "azimuths": None}, "belongs to a free wake of rigid blades, or to flight")
-    wanted, requests = _wanted(chosen), _requests(chosen)
-    for request in requests:
-        hover_flight.check(request, wanted)
-    out = make_folder(chosen.out)
-    introduce(requests[0].rotor, requests[0].operating, moves=True)
-    flown, lost = [], []
-    with _progress_bar() as progress:
-        for request in requests:
-            found = hover_flight.linearise_hover(request, wanted, progress)
-            if isinstance(found, hover_flight.LinearHover):
-                hover_output.write(found, out if len(requests) == 1 else _of_height(out, request.height), chosen.time)
-                flown.append(found)
-            else:
-                lost.append(found)
-    return _told([hover_output.lines(one) for one in flown], lost, out)
-
-
-def _of_height(out: Path, height: float | None) -> Path:
-    from rotorjax.io.atomic import make_folder
-
-    return make_folder(out / ("free_air" if height is None else f"height_{height:g}"))
-
-
-def _told(lines: list[str], lost: "list[Result]", out: Path) -> int:
-    """Print what was found and what was not; the exit code."""
+        for one in known:
+            trim_output.write(one, out, chosen.time)
+    else:
+        schedule.write(known, out, chosen.time)
     for one in lost:
         where = "" if one.request.height is None else f", height {one.request.height:g}"
         print(f"advance ratio {one.request.advance:g}{where}: not converged: {one.trimmed.outcome.why}")
-    print("\n".join([*lines, f"written: {out}"]))
+    print("\n".join([*map(trim_output.lines, known), f"written: {out}"]))
     return 1 if lost else 0
 
 
 def _wanted(chosen: argparse.Namespace) -> "Wanted":
     """What to linearise for."""
     from rotorjax.commands.arguments import names_of
-    from rotorjax.linearisation.flight import CONTROLS, OUTPUTS, Wanted
+    from rotorjax.linearisation.found import CONTROLS, OUTPUTS, Wanted
 
     inputs, outputs = (
         default if text is None else names_of(text)

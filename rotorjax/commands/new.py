@@ -22,10 +22,11 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="a rotor or a case to begin with",
         description="Write a commented rotor file or case and say how to run it: rotor (three blades, every key), "
         "simulate (a step of collective close to the ground), gust, freewake (a step with the free wake), sweep "
-        "(heights and slopes), deck (a landing). Files that are there are not replaced.",
+        "(heights and slopes), deck (a landing). Files that are there are not replaced. Without a folder a case is "
+        "printed.",
     )
     parser.add_argument("kind", choices=tuple(TRY), help="what to write")
-    parser.add_argument("folder", type=Path, metavar="DIR", help="where")
+    parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="where (none: to the screen)")
     parser.set_defaults(run=run, free_wake=lambda _: False)
 
 
@@ -34,7 +35,14 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import make_folder, write_bytes
 
-    files = (*sorted((PACKAGE / "examples" / chosen.kind).glob("*.toml")), *WITH.get(chosen.kind, ()))
+    (case,) = (PACKAGE / "examples" / chosen.kind).glob("*.toml")
+    if chosen.folder is None and chosen.kind in WITH:
+        others = ", ".join(file.name for file in WITH[chosen.kind])
+        raise InputError(f"Argument `DIR` must be given with {chosen.kind}, whose file refers to {others} beside it")
+    if chosen.folder is None:
+        print(case.read_text(encoding="utf-8"), end="")
+        return 0
+    files = (case, *WITH.get(chosen.kind, ()))
     for file in files:
         if (there := chosen.folder / file.name).exists():
             raise InputError(f"{there}: is there already and is not replaced; take another folder than {chosen.folder}")

@@ -10,9 +10,9 @@ def register(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser(
         "simulate",
         help="the coupled rotor under histories of controls and hub motion",
-        description="March flap, lag and inflow from a trim and write history.nc, report.json, histories.png and, on "
-        "request, animation.gif; of a free wake also wake.png, wake.html to turn and a folder vtk for ParaView. "
-        "`rotorjax.simulation.case` shows a case file.",
+        description="March flap, lag and inflow from a trim and write history.nc, report.html, report.json, "
+        "histories.png and, on request, animation.gif; of a free wake also wake.png, wake.html to turn and a folder "
+        "vtk for ParaView. `rotorjax.simulation.case` shows a case file.",
     )
     parser.add_argument("--case", required=True, type=Path, metavar="FILE", help="case in TOML")
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")

@@ -30,6 +30,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     )
     add("--json", type=Path, metavar="FILE", help="all numbers; of a curve a list of them under `points`")
     add("--plot", type=Path, metavar="FILE", help="picture of a curve: .png, .pdf or .svg")
+    add("--html", type=Path, metavar="FILE", help="report that opens offline: the answer, the curve, all points")
     parser.set_defaults(run=run, free_wake=lambda chosen: chosen.inflow == "freewake")
 
 
@@ -58,18 +59,24 @@ def run(chosen: argparse.Namespace) -> int:
     check_picture(chosen.plot)
     if chosen.plot is not None and len(wanted) == 1:
         raise InputError("Argument `plot` must come with several speeds or heights, but there is one point")
-    for path in (chosen.json, chosen.plot):
+    for path in (chosen.json, chosen.plot, chosen.html):
         check_output(path)
-    free = [*requests(base, speeds, [None])] if chosen.plot is not None and len(heights) > 1 else []
+    pictured = chosen.plot is not None or chosen.html is not None
+    free = [*requests(base, speeds, [None])] if pictured and len(heights) > 1 else []
     introduce(base.rotor, base.operating, moves=True)
     results = curve([*wanted, *free])
     found = [numbers(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))
     if chosen.json is not None:
         write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
+    points, alone = results[: len(wanted)], results[-1] if free else None
     if chosen.plot is not None:
         from rotorjax.bench.plotting import save_file  # matplotlib takes half a second to load
         from rotorjax.trim.curve_picture import draw
 
-        save_file(draw(results[: len(wanted)], results[-1] if free else None), chosen.plot)
+        save_file(draw(points, alone), chosen.plot)
+    if chosen.html is not None:
+        from rotorjax.trim.report import write_report
+
+        write_report(chosen.html, points, alone)
     return 0 if all(one["converged"] for one in found) else 1

@@ -18,6 +18,7 @@
     t = [0.0, 10.0, 30.0, 40.0]
     height = [2.0, 2.0, 0.8, 0.8]      # over the deck's mean place, over R
     edge = [-1.5, -1.5, 1.5, 1.5]      # optional: the deck's edge in the hub frame (positive aft), deck before it
+    collective_deg = [17.0, 16.6, 16.5, 16.0]      # optional: what the pilot does, in place of the one of [rotor]
 
     [deck]                     # all optional
     heave = 0.06               # amplitude over R
@@ -66,6 +67,7 @@ SCHEMA: Schema = {
         "t": Key("numbers", Range(-1e5, 1e6, "s"), required=True),
         "height": Key("numbers", Range(-10.0, 100.0, "R"), required=True),
         "edge": Key("numbers", Range(-1000.0, 1000.0, "R")),
+        "collective_deg": Key("numbers", Range(-45.0, 45.0, "deg")),
     },
     "deck": {
         "heave": Key("number", Range(0.0, 2.0, "R")),
@@ -80,13 +82,13 @@ _MOST_STEPS = 500_000
 
 @dataclass(frozen=True)
 class DeckCase:
-    """One case. rigid: blades do not flap. t, height, edge (P,): points of the path (s, over R), edge None for a deck
-    without one. duration (s). heave (over R), pitch (rad): amplitudes, with periods in s; edge_azimuth (rad).
+    """One case. rigid: blades do not flap. t, height, edge, collective (P,): points of the path (s, over R, rad), edge
+    None for a deck without one. duration (s). heave (over R), pitch (rad): amplitudes, with periods in s; edge_azimuth
+    (rad).
     """
 
     rotor: Rotor
     operating: OperatingPoint
-    collective: float
     rigid: bool
     variant: Variant
     harmonics: int
@@ -96,6 +98,7 @@ class DeckCase:
     t: Float[np.ndarray, " P"]
     height: Float[np.ndarray, " P"]
     edge: Float[np.ndarray, " P"] | None
+    collective: Float[np.ndarray, " P"]
     heave: float
     heave_period: float
     pitch: float
@@ -113,7 +116,7 @@ class DeckCase:
         return np.linspace(0.0, self.duration * self.omega, steps + 1)
 
     def motion(self, psi: Float[np.ndarray, " T"]) -> dict[str, Float[np.ndarray, " T"]]:
-        """Return height, slope, edge, their rates, the hub's climb and its rate at azimuths, in rotor units."""
+        """Return height, slope, edge, rates, the hub's climb and its rate, collective at azimuths, in rotor units."""
         t, omega = psi / self.omega, self.omega
         path = PchipInterpolator(self.t, self.height)
         turn, rock = 2 * np.pi / self.heave_period, 2 * np.pi / self.pitch_period
@@ -127,6 +130,7 @@ class DeckCase:
             "climb": climb,
             "climb_rate": path(t, 2) / omega**2,
             "edge": edge,
+            "collective": PchipInterpolator(self.t, self.collective)(t),
         }
 
 
@@ -147,7 +151,6 @@ def _build(data: Tables, folder: Path) -> DeckCase:
     case = DeckCase(
         rotor=rotor,
         operating=operating,
-        collective=np.deg2rad(body["collective_deg"]) if "collective_deg" in body else float(operating.collective),
         rigid=_rigid(body.get("rigid"), rotor),
         variant=model.get("variant", "dynamic"),
         harmonics=model.get("harmonics", 1),
@@ -157,6 +160,7 @@ def _build(data: Tables, folder: Path) -> DeckCase:
         t=np.array(path["t"]),
         height=np.array(path["height"]),
         edge=np.array(path["edge"]) if "edge" in path else None,
+        collective=_collective(body, path, float(operating.collective)),
         heave=deck.get("heave", 0.0),
         heave_period=deck.get("heave_period", 8.0),
         pitch=np.deg2rad(deck.get("pitch_deg", 0.0)),
@@ -166,6 +170,15 @@ def _build(data: Tables, folder: Path) -> DeckCase:
     _check_effect(path, deck)
     _check(case)
     return case
+
+
+def _collective(body: Tables, path: Tables, usual: float) -> Float[np.ndarray, " P"]:
+    """Collective (rad) at the path's points: its own, or the rotor's all the way."""
+    if "collective_deg" not in path:
+        return np.full(len(path["t"]), np.deg2rad(body["collective_deg"]) if "collective_deg" in body else usual)
+    if "collective_deg" in body:
+        raise InputError("[rotor] collective_deg must be absent where [path] has it, without which it has no effect")
+    return np.deg2rad(path["collective_deg"])
 
 
 def _check_effect(path: dict[str, Any], deck: dict[str, Any]) -> None:
@@ -179,7 +192,7 @@ def _check_effect(path: dict[str, Any], deck: dict[str, Any]) -> None:
 
 def _check(case: DeckCase) -> None:
     require_increasing("path.t", case.t)  # type: ignore[arg-type]
-    for name, values in {"height": case.height, "edge": case.edge}.items():
+    for name, values in {"height": case.height, "edge": case.edge, "collective_deg": case.collective}.items():
         if values is not None and values.shape != case.t.shape:
             raise ArgumentError(f"path.{name}", f"hold {case.t.size} values as t", f"of {values.size}")
     if case.t[0] > 0 or case.t[-1] < case.duration:
@@ -197,8 +210,9 @@ def _check_theory(case: DeckCase, t: Float[np.ndarray, " T"], motion: dict[str, 
     height, slope, climb = motion["height"], np.abs(motion["slope"]), motion["climb"]
     rim = height * np.cos(slope) - np.sin(slope)
     tip_speed = case.omega * float(case.rotor.radius)
-    for i in {int(np.argmin(v)) for v in (height, rim, climb)} | {int(np.argmax(climb))}:
-        flown = replace(case.operating, collective=np.float64(case.collective), climb=climb[i] * tip_speed)
+    collective = motion["collective"]
+    for i in {int(np.argmin(v)) for v in (height, rim, climb, collective)} | {int(np.argmax(climb))}:
+        flown = replace(case.operating, collective=np.float64(collective[i]), climb=climb[i] * tip_speed)
         try:
             check_place("vpbfsm", float(height[i]), float(np.rad2deg(slope[i])))
             check_axial("vpbfsm", case.rotor, flown)

@@ -1,6 +1,6 @@
 """A rotor over a ship's deck: pictures, animation and report of its histories."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,75 @@ from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
 from rotorjax.bench.film import write_film
+from rotorjax.bench.markdown import table
+from rotorjax.io import netcdf
+from rotorjax.io.atomic import write_json
+from rotorjax.io.page import write_page
 
 DYNAMIC, STATIC = plotting.FREE_WAKE, plotting.VPBFSM
 FLAPPING = {"beta_0": r"$\beta_0$", "beta_1c": r"$\beta_{1c}$", "beta_1s": r"$\beta_{1s}$"}
 _SNAPSHOTS = 4
 
 
+def write_all(data: xr.Dataset, figures: dict[str, float], out: Path, *, animated: bool = False) -> dict[str, Any]:
+    """Write history.nc, report.json, report.html, histories and disk as PNG and PDF; on request animation.gif.
+
+    Returns the content of report.json. Raises InputError where a file cannot be written.
+    """
+    netcdf.write(out / "history.nc", data)
+    found = report(data, figures)
+    write_json(out / "report.json", found)
+    plotting.save(histories(data), out / "histories")
+    plotting.save(snapshots(data), out / "disk")
+    if animated:
+        animation(data, out / "animation.gif")
+    write_page(out / "report.html", markdown(found, data, animated=animated))
+    return found
+
+
+def markdown(found: dict[str, Any], data: xr.Dataset, *, animated: bool = False) -> str:
+    """The page of a case: what the ground did, pictures, histories."""
+    most, rows = found["largest_difference_from_static"], found["histories"]
+    thrust = rows["thrust"]
+    pictures = {
+        "histories.png": "The deck under the hub, inflow, thrust and flapping. Dashed: the steady ground effect "
+        "of each instant.",
+        "disk.png": "The inflow over the disk, seen from above.",
+        **({"animation.gif": "The rotor over its deck."} if animated else {}),
+    }
+    head = ("history", "unit", "first", "last", "least", "most")
+    cells = [
+        (n, data[n].attrs.get("units", ""), *(r[k] for k in ("first", "last", "min", "max"))) for n, r in rows.items()
+    ]
+    parts = [
+        f"# Over a deck: {found['rotor']}, {found['variant']} ground effect",
+        f"- From a collective of {found['collective_deg']:.2f}° on C_T goes from {thrust['first']:.5f} to "
+        f"{thrust['last']:.5f}, between {thrust['min']:.5f} and {thrust['max']:.5f}.\n"
+        f"- The mean inflow differs from the steady one of the same instant by up to {100 * most['relative']:.1f} %, "
+        f"at {most['time_s']:.1f} s.\n"
+        f"- At most {100 * found['ground_residual_max']:.1f} % of the flow into the deck is left on it.\n"
+        f"- {found['simulated_s']:.1f} s in {found['steps']} steps of {found['step_us']:.0f} µs.",
+        *(f"![{name}]({name})\n\n{caption}" for name, caption in pictures.items()),
+        "## Histories\n\n" + table(head, cells),
+        "history.nc holds all of it over time. λ positive down, over ΩR; heights over R; C_T = T/(ρA(ΩR)²).",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
 def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
     """Return the numbers of report.json: measured figures, and extremes, ends and lag of the histories."""
-    names = ("height", "slope", "uniform", "cosine", "sine", "thrust", "static_uniform", "static_thrust", *FLAPPING)
+    names = (
+        "height",
+        "slope",
+        "collective",
+        "uniform",
+        "cosine",
+        "sine",
+        "thrust",
+        "static_uniform",
+        "static_thrust",
+        *FLAPPING,
+    )
     series = {
         name: {
             "first": float(data[name][0]),
@@ -52,7 +112,9 @@ def report(data: xr.Dataset, figures: dict[str, float]) -> dict[str, Any]:
 
 
 def histories(data: xr.Dataset) -> Figure:
-    """Draw deck's motion, inflow's three parts, thrust and flapping over time, beside the static ground effect."""
+    """Draw deck's motion, inflow's three parts, thrust and collective, and flapping over time, beside the static
+    ground effect.
+    """
     flapping = "beta_0" in data
     with plotting.style():
         figure = plotting.new_figure(7.5, 9.8 if flapping else 8.0)
@@ -67,14 +129,14 @@ def histories(data: xr.Dataset) -> Figure:
         slope.set_ylabel("deg")
         slope.grid(visible=False)
         lines = [*axes[0].get_lines(), *slope.get_lines()]
-        axes[0].legend(
-            lines, [str(line.get_label()) for line in lines], ncols=3, loc="lower left", bbox_to_anchor=(0, 1)
-        )
+        _legend(axes[0], lines)
         _pair(axes[1], t, data["uniform"], data["static_uniform"], r"$\lambda_0/\Omega R$", data.attrs["variant"])
         _pair(axes[2], t, data["cosine"], data["static_cosine"], r"$\lambda_{1c},\ \lambda_{1s}$", r"$\lambda_{1c}$")
         axes[2].plot(t, data["sine"], color="#009E73", lw=1.0, label=r"$\lambda_{1s}$")
-        axes[2].legend(ncols=3, loc="best")
+        _legend(axes[2], axes[2].get_lines())
         _pair(axes[3], t, data["thrust"], data["static_thrust"], r"$C_T$", data.attrs["variant"])
+        if float(np.ptp(data["collective"].values)) > 0:
+            _collective(axes[3], data)
         if flapping:
             _flapping(axes[4], data)
         axes[-1].set_xlabel("time, s")
@@ -86,7 +148,21 @@ def _pair(axes: Any, t: np.ndarray, ours: xr.DataArray, steady: xr.DataArray, la
     axes.plot(t, steady, color=STATIC, ls="--", lw=1.1, label="steady at each instant")
     axes.plot(t, ours, color=DYNAMIC, label=name)
     axes.set_ylabel(label)
-    axes.legend(ncols=2, loc="best")
+    _legend(axes, axes.get_lines())
+
+
+def _legend(axes: Any, lines: Sequence[Any]) -> None:
+    """A legend above the axes, where it hides no curve."""
+    axes.legend(lines, [str(line.get_label()) for line in lines], ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+
+
+def _collective(axes: Any, data: xr.Dataset) -> None:
+    """Collective on the right."""
+    right = axes.twinx()
+    right.grid(visible=False)
+    lines = right.plot(data["time"], data["collective"], color="#009E73", lw=1.0, label=r"$\theta_0$ (right)")
+    right.set_ylabel("deg")
+    _legend(axes, [*axes.get_lines(), *lines])
 
 
 def _flapping(axes: Any, data: xr.Dataset) -> None:
@@ -100,7 +176,7 @@ def _flapping(axes: Any, data: xr.Dataset) -> None:
         lines += side.plot(data["time"], data[name], color=colour, lw=1.1, label=label)
     axes.set_ylabel("tilt, deg")
     right.set_ylabel("coning, deg")
-    axes.legend(lines, [line.get_label() for line in lines], ncols=3, loc="best")
+    _legend(axes, lines)
 
 
 def snapshots(data: xr.Dataset) -> Figure:

@@ -80,8 +80,8 @@ def build(case: DeckCase, variant: Variant | None = None) -> tuple[OverGround, F
     flapping = None if case.rigid else tip_path(case.rotor, case.operating)
     model = over_ground(rotor, table, blades, variant, transport, at, flapping)
     ground = GroundMotion(*(jnp.asarray(motion[k]) for k in ("height", "slope", "height_rate", "slope_rate")))
-    along = {name: jnp.asarray(motion[name]) for name in ("climb", "climb_rate", "edge")}
-    return model, psi, controls(ground, rotor, case.collective, **along)
+    along = {name: jnp.asarray(motion[name]) for name in ("climb", "climb_rate", "edge", "collective")}
+    return model, psi, controls(ground, rotor, **along)
 
 
 def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
@@ -125,7 +125,7 @@ def _trimmed(model: OverGround, first: Controls, case: DeckCase) -> RotorState:
     except RuntimeError:
         state = None
     if state is None or not float(state.a[model.rotor.modes.index(0, 1)]) > 0:
-        degrees = np.rad2deg(case.collective)
+        degrees = float(np.rad2deg(case.collective[0]))
         raise InputError(f"Argument `collective_deg` must give a steady thrust at the start, but is {degrees:g}")
     return state
 
@@ -177,6 +177,7 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
             "edge": series(kept.edge, "R", "edge of the deck, positive aft of the hub"),
             "has_edge": float(case.edge is not None),
             "climb": series(kept.climb, "ΩR", "climb of the hub"),
+            "collective": series(jnp.rad2deg(kept.collective), "deg", "collective pitch"),
             "uniform": series(out.uniform, "ΩR", "mean inflow"),
             "cosine": series(out.cosine, "ΩR", "fore-and-aft inflow, positive aft"),
             "sine": series(out.sine, "ΩR", "lateral inflow, positive to starboard"),
@@ -191,7 +192,11 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
             "states": (("time", "state"), np.asarray(history.states.a), {"units": "ΩR"}),
         },
         coords={"time": ("time", seconds, {"units": "s"}), "psi": GRID_PSI, "r": GRID_R},
-        attrs={"rotor": case.rotor.name, "variant": case.variant, "collective_deg": float(np.rad2deg(case.collective))},
+        attrs={
+            "rotor": case.rotor.name,
+            "variant": case.variant,
+            "collective_deg": float(np.rad2deg(case.collective[0])),
+        },
     )
 
 

@@ -7,8 +7,8 @@ ring state, there is none: `flight_state` names where a rotor is, and is the one
 Carpenter & Fridovich (NACA TN 3044, 1953) give the uniform inflow the mass of a disk that is accelerated in still air:
 8/(3π) λ̇ + 2 V_T λ = C_T, V_T = √(μ² + (λ + λ_c)²). Steady, it is Glauert's momentum theory.
 
-Ground: the images' upflow at the hub takes away the share (1/16h²)/(1 + (μ/λ)²) of the induced velocity (Cheeseman &
-Bennett, ARC R&M 3021, 1955), over level ground and for h above about half a radius.
+Ground: Cheeseman and Bennett's T/T∞ = 1/(1 − (1/16h²)/(1 + (μ/λ)²)) at the same induced power (ARC R&M 3021, 1955),
+over level ground and for h above about half a radius. Here the thrust is given, and its inflow sought: `ground_share`.
 """
 
 from typing import Any, Literal
@@ -53,14 +53,19 @@ def flow_through(
 
 
 def ground_share(mean: Float[Array, ""], inputs: RotorInputs) -> Float[Array, ""]:
-    """Share of the induced velocity that is left over ground (Cheeseman & Bennett)."""
+    """Share of the induced velocity that is left over ground at the same thrust.
+
+    Cheeseman and Bennett's s = T∞/T holds at the same power. Momentum theory's power goes as T^{1+n}, n = dln λ/dln T =
+    1/(1 + λ²/V_T²), so that at the same thrust it is s^{1+n} of that in free air: s^{3/2} in hover, s² in fast flight.
+    """
     if inputs.height is None:
         return jnp.ones_like(mean)
     wind, through = edgewise(inputs), mean + inputs.climb
     square = wind @ wind + through**2
     rest = square == 0
     axial = jnp.where(rest, 1.0, through**2) / jnp.where(rest, 1.0, square)
-    return 1 - axial / (16 * inputs.height**2)
+    same_power = jnp.maximum(1 - axial / (16 * inputs.height**2), 0.0)  # zero where the source leaves no flow
+    return same_power ** (1 + 1 / (1 + axial))
 
 
 def in_vortex_ring(thrust: Float[np.ndarray, "*n"], climb: Float[np.ndarray, "*n"], advance: Any) -> Any:

@@ -3,6 +3,7 @@
 import base64
 import html
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from rotorjax.io.atomic import write_text
@@ -11,8 +12,9 @@ TEMPLATE = Path(__file__).with_name("page.html")
 KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif"}
 
 
-def write_page(path: str | Path, text: str) -> None:
-    """Write Markdown as a page. Pictures are taken from the page's folder; one that is not there stays a link.
+def write_page(path: str | Path, text: str, pictures: Mapping[str, bytes] | None = None) -> None:
+    """Write Markdown as a page. Pictures are taken from `pictures`, by name, else from the page's folder; one that is
+    not there stays a link.
 
     The title is the first heading. Raises InputError where the file cannot be written.
     """
@@ -20,7 +22,8 @@ def write_page(path: str | Path, text: str) -> None:
 
     path = Path(path)
     maker = Markdown(extensions=["tables", "toc", "sane_lists"], extension_configs={"toc": {"toc_depth": "2-2"}})
-    body = re.sub(r'<img ([^>]*?)src="([^"]+)"', lambda m: _embedded(m, path.parent), maker.convert(text))
+    given = pictures or {}
+    body = re.sub(r'<img ([^>]*?)src="([^"]+)"', lambda m: _embedded(m, path.parent, given), maker.convert(text))
     body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
     heading = re.search(r"^# (.+)$", text, re.MULTILINE)
     page = TEMPLATE.read_text(encoding="utf-8")
@@ -30,9 +33,10 @@ def write_page(path: str | Path, text: str) -> None:
     write_text(path, page)
 
 
-def _embedded(match: re.Match[str], folder: Path) -> str:
-    picture = folder / html.unescape(match[2])
-    if picture.suffix not in KINDS or not picture.is_file():
+def _embedded(match: re.Match[str], folder: Path, given: Mapping[str, bytes]) -> str:
+    name = html.unescape(match[2])
+    picture = folder / name
+    if picture.suffix not in KINDS or not (name in given or picture.is_file()):
         return match[0]
-    content = base64.b64encode(picture.read_bytes()).decode()
+    content = base64.b64encode(given[name] if name in given else picture.read_bytes()).decode()
     return f'<img loading="lazy" {match[1]}src="data:{KINDS[picture.suffix]};base64,{content}"'

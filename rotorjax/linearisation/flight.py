@@ -9,9 +9,11 @@ from rotorjax.coupled import Coupled
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import rotor, steps
-from rotorjax.linearisation.compact import Compact, check_order, compact, frequencies, gaps, kept_states
+from rotorjax.linearisation.compact import check_order, compact, frequencies, gaps, kept_states
 from rotorjax.linearisation.drive import check_names, drive_of
-from rotorjax.linearisation.modes import Mode, modes
+from rotorjax.linearisation.found import LinearRotor, Wanted, flight_notes
+from rotorjax.linearisation.hover_flight import LinearHover, hovering
+from rotorjax.linearisation.modes import modes
 from rotorjax.linearisation.stages import Stages
 from rotorjax.linearisation.wake_flight import InWake, all_modes, base_in_flight, linear_in_flight
 from rotorjax.ode.harmonic import harmonic_model
@@ -24,56 +26,42 @@ from rotorjax.trim.run import FREE_WAKE, Progress, Request, Result, prepare, run
 from rotorjax.trim.run import check as check_request
 from rotorjax.wake.settings import flight_settings
 
-CONTROLS = ("theta_0", "theta_1c", "theta_1s", "u", "v", "w", "p", "q", "r")
-"""Inputs by default."""
-OUTPUTS = (
-    *("CT", "CQ", *"XYZLMN", "beta_0", "beta_1c", "beta_1s", "lag_0", "lag_1c", "lag_1s"),
-    *("lambda_0", "lambda_1c", "lambda_1s"),
-)
-"""Outputs by default."""
-
 
 @dataclass(frozen=True)
-class Wanted:
-    """What to linearise for. order: of the small model. harmonics: of the rotor's turn that the time-invariant model
-    holds, up to this one. azimuths: of a revolution.
+class LinearFlight(LinearRotor):
+    """A trim with an inflow model, or a flight in the free wake. full holds the harmonics of `held`. full_gap_db,
+    full_gap_deg (q, m): its largest differences from the periodic model's harmonic-0 transfer function up to 2/rev;
+    small's are from that too. step_error (q, m): of the periodic model against the nonlinear march (steps.py).
     """
 
-    inputs: tuple[str, ...] = CONTROLS
-    outputs: tuple[str, ...] = OUTPUTS
-    order: int = 20
-    harmonics: int = 0
-    azimuths: int = rotor.AZIMUTHS
-
-
-@dataclass(frozen=True)
-class LinearFlight:
-    """Everything found about one trim. full: time-invariant, of the harmonics held. full_gap_db, full_gap_deg (q, m):
-    its largest differences from the periodic model's harmonic-0 transfer function up to 2/rev; small's are from that
-    too. step_error (q, m): of the periodic model against the nonlinear march (steps.py). seconds: wall time by stage.
-    """
-
-    result: Result
     periodic: PeriodicModel
     held: tuple[int, ...]
-    full: LinearModel
     full_gap_db: Float[np.ndarray, "q m"]
     full_gap_deg: Float[np.ndarray, "q m"]
-    small: Compact
-    modes: tuple[Mode, ...]
     step_error: Float[np.ndarray, "q m"]
-    seconds: dict[str, float]
     wake: InWake | None = None
+
+    @property
+    def models(self) -> dict[str, LinearModel | PeriodicModel]:
+        """The periodic one too."""
+        return super().models | {"periodic": self.periodic}
+
+
+def hovers_in_wake(request: Request) -> bool:
+    """Whether the model is one of a hover in the free wake, that looks the same from every azimuth."""
+    return request.inflow == FREE_WAKE and not request.advance
 
 
 def check(request: Request, wanted: Wanted) -> None:
-    """Raise InputError for names, an order, harmonics or azimuths that cannot be, before anything is solved."""
+    """Raise InputError for a flight, names, an order, harmonics or azimuths that cannot be, before any work."""
     p, hub, model = _before(request)
     blades = request.rotor.blades
     check_names("inputs", wanted.inputs, rotor.drive_names(drive_of(hub, p)), model)
     check_names("outputs", wanted.outputs, rotor.output_names(p, request.height is not None), model)
     motions = len(kept_states(tuple(f"beta_{name}" for name in multiblade.names(blades))))
     check_order(wanted.order, 4 * motions)
+    if hovers_in_wake(request):
+        return _check_hover(request, wanted)
     if wanted.azimuths < 4 * blades:
         raise InputError(
             f"Argument `azimuths` must be at least {4 * blades} for {blades} blades, but is {wanted.azimuths}"
@@ -84,48 +72,91 @@ def check(request: Request, wanted: Wanted) -> None:
             f"Argument `harmonics` must lie in [0, {most}] for {wanted.azimuths} azimuths a revolution, but is "
             f"{wanted.harmonics}"
         )
+    return None
+
+
+def _check_hover(request: Request, wanted: Wanted) -> None:
+    """What a time-invariant model does not have."""
+    if wanted.harmonics:
+        raise InputError(
+            "Argument `harmonics` must be 0 in hover, which does not change with the azimuth, but is "
+            f"{wanted.harmonics}"
+        )
+    if wanted.azimuths != rotor.AZIMUTHS:
+        raise InputError(
+            "Argument `azimuths` must be left out in hover, which does not change with the azimuth, but is "
+            f"{wanted.azimuths}"
+        )
 
 
 def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
     """Rotor and inputs of a flight, its controls not yet known, and the inflow's name."""
     tilt = request.flight.tilt
-    still = Controls(0 * tilt, 0 * tilt, 0 * tilt, tilt)
+    still = inputs_at(Controls(0 * tilt, 0 * tilt, 0 * tilt, tilt), request.flight)
     if request.inflow != FREE_WAKE:
-        return prepare(request)[0], inputs_at(still, request.flight), f"{request.inflow} inflow"
+        return prepare(request)[0], still, f"{request.inflow} inflow"
     check_request(request)
-    if not request.advance or request.slope_deg:
-        raise InputError(
-            "Arguments must ask for a flight over level ground or none where the free wake's model is periodic "
-            f"(`advance_ratio` not 0, `slope` 0), but are {request.advance:g} and {request.slope_deg:g}: "
-            "linearisation.hover_flight has level hover"
-        )
+    _check_in_wake(request)
     settings = request.wake or flight_settings(request.rotor.blades)
-    wake = coupled_wake(request.rotor, request.operating, settings, request.ground)
-    return wake, inputs_at(still, request.flight), "a free wake"
+    return coupled_wake(request.rotor, request.operating, settings, request.ground), still, "a free wake"
 
 
-def linearise_flight(
-    about: Request | Result, wanted: Wanted, progress: Progress | None = None, start: Result | None = None
-) -> LinearFlight | Result:
+def _check_in_wake(request: Request) -> None:
+    """Raise InputError for a flight whose free wake has no linear model here."""
+    if request.slope_deg:
+        way = "a level flight over it has no steady state" if request.advance else "take inflow 'vpbfsm'"
+        raise InputError(
+            f"Argument `slope` must be 0 for a linear model in the free wake, but is {request.slope_deg:g}: {way}"
+        )
+    if request.advance:
+        return
+    if request.tilt_deg:
+        raise InputError(
+            "Argument `tilt` must be 0 in hover for a time-invariant model in the free wake, but is "
+            f"{request.tilt_deg:g}: take an advance ratio, or inflow 'pitt-peters' or 'vpbfsm'"
+        )
+    blades = request.rotor.blades
+    if blades < 3:
+        raise InputError(
+            "Argument `rotor` must have at least three blades, whose cyclic motion in the hovering free wake looks the "
+            f"same from every azimuth, but has {blades}: take an inflow model for fewer"
+        )
+
+
+def linearise_trim(
+    about: Request | Result, wanted: Wanted, progress: Progress | None = None, near: LinearRotor | None = None
+) -> LinearFlight | LinearHover | Result:
     """Trim where that is still to do, linearise and reduce; a trim that did not converge is returned as it is.
 
-    start: a trim nearby. progress(stage, residual) is called as things go on. Raises InputError as `check` and
-    `trim.run.run` do.
+    near: of a trim nearby, from which this one starts; its wake is condensed to as many states. progress(stage,
+    residual) is called as things go on. Raises InputError as `check` and `trim.run.run` do.
     """
     request = about if isinstance(about, Request) else about.request
     check(request, wanted)
     clock = Stages(progress)
-    result = run(about, start, progress) if isinstance(about, Request) else about
+    result = (
+        run(about, None if near is None else near.result.trimmed, progress) if isinstance(about, Request) else about
+    )
     clock.done("trim")
     if not result.converged:
         return result
+    if hovers_in_wake(request):
+        return hovering(result, wanted, clock, progress)
+    other = near.periodic if isinstance(near, LinearFlight) and near.wake is not None else None
+    return _flying(result, wanted, clock, progress, other)
+
+
+def _flying(
+    result: Result, wanted: Wanted, clock: Stages, progress: Progress | None, near: PeriodicModel | None
+) -> LinearFlight | Result:
+    """Linearise what may change with the azimuth. near: a condensed model of a flight nearby."""
     base = rotor.base_of(result.trimmed, wanted.azimuths)
-    if request.inflow == FREE_WAKE:
+    if result.request.inflow == FREE_WAKE:
         base = base_in_flight(base, wanted.azimuths, progress)
         clock.done("periodic march")
         if not base.orbit.converged:
             return _lost(result, base.orbit.why)
-        periodic, wake = linear_in_flight(base, wanted.inputs, wanted.outputs, clock.done, progress)
+        periodic, wake = linear_in_flight(base, wanted.inputs, wanted.outputs, clock.done, progress, near)
         error = wake.step_error
     else:
         periodic, wake = rotor.linear_rotor(base, wanted.inputs, wanted.outputs), None
@@ -143,7 +174,7 @@ def linearise_flight(
     small = compact(full, wanted.order, truth)
     clock.done("reduction")
     gap = gaps(truth, full.response(frequencies()))
-    return LinearFlight(result, periodic, held, full, *gap, small, found, error, clock.seconds, wake)
+    return LinearFlight(result, full, small, found, clock.seconds, periodic, held, *gap, error, wake)
 
 
 def _lost(result: Result, why: str) -> Result:
@@ -159,15 +190,3 @@ def held_harmonics(model: PeriodicModel, highest: int) -> tuple[int, ...]:
         least = "it does not change with the azimuth" if not step else f"its lowest harmonic is {step}"
         raise InputError(f"Argument `harmonics` must suit the model, but is {highest} and {least}")
     return tuple(range(0, highest + 1, step)) if step else (0,)
-
-
-def flight_notes(result: Result) -> dict[str, float]:
-    """The flight in numbers, for whoever reads a model."""
-    request, flown = result.request, result.means
-    found = {
-        "CT": flown.CT,
-        "advance_ratio": request.advance,
-        "climb": request.climb,
-        "shaft_tilt_deg": float(np.rad2deg(flown.controls[3])),
-    }
-    return found if request.height is None else found | {"height": request.height, "slope_deg": request.slope_deg}

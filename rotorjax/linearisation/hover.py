@@ -151,19 +151,24 @@ def _stepped(wave: Wave, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N
 
 
 def hover_model(
-    base: Base, inputs: Sequence[str], outputs: Sequence[str], progress: Progress | None = None
+    base: Base,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    progress: Progress | None = None,
 ) -> HoverModel:
     """Linearise a hover in the free wake, all equations as they are marched.
 
-    progress(stage, 0): called after each pass, with how far it is. Raises InputError where the trim has not converged
-    or changes with the azimuth, a name is unknown, or there are fewer than three blades, whose cyclic motion does.
+    inputs, outputs: names, None for all but section loads. progress(stage, 0): called after each pass, with how far it
+    is. Raises InputError where the trim has not converged or changes with the azimuth, a name is unknown, or there are
+    fewer than three blades, whose cyclic motion does.
     """
-    _check(base, inputs, outputs)
+    _check(base)
+    inputs, outputs = rotor.chosen_names(base, inputs, outputs)
     x, blades = base.orbit.start, base.p.rotor.blades
     members = members_of(x, blades)
     first = np.zeros((members.shape[1], ravel_pytree(x)[0].size))
     first[np.arange(members.shape[1])[:, None], members.T] = np.asarray(multiblade.inverse(jnp.zeros(()), blades))[:, 0]
-    value, columns, of_inputs, rows = _derivatives(base, first, tuple(inputs), tuple(outputs), progress)
+    value, columns, of_inputs, rows = _derivatives(base, first, inputs, outputs, progress)
     moved = np.moveaxis(columns[:, members], 0, -1)  # coordinate, state of a blade, state of the blade that moved
     driven, seen = np.moveaxis(of_inputs[:, members], 0, -1), np.moveaxis(rows[:, members], 1, 0)
     order = multiblade.names(blades)
@@ -174,7 +179,7 @@ def hover_model(
         d=of_inputs[:, n:].T,
         names=tuple(names[k].replace("_0", "_{}", 1) for k in members[0]),
         units=tuple(units[k] for k in members[0]),
-        inputs=tuple(inputs),
+        inputs=inputs,
         outputs=readings.expanded(outputs, stations(base.p).size),
         u=np.array([float(base.u[name]) for name in inputs]),
         y=value,
@@ -183,17 +188,17 @@ def hover_model(
     )
 
 
-def _check(base: Base, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+def _check(base: Base) -> None:
     require_converged(base.orbit)
-    if not base.steady:
-        raise InputError("Argument `base` must be a hover over level ground or none, but changes with the azimuth")
+    if not base.steady or float(base.u.get("pitch", 0.0)):
+        raise InputError(
+            "Argument `base` must be a hover, the shaft upright over level ground or none, but changes with the azimuth"
+        )
     if base.p.rotor.blades < 3:
         raise InputError(
             "Argument `rotor` must have at least three blades, whose cyclic motion in the free wake looks the same "
             f"from every azimuth, but has {base.p.rotor.blades}: take an inflow model for two"
         )
-    drive.check_names("inputs", inputs, rotor.drive_names(base.u), base.model)
-    drive.check_names("outputs", outputs, rotor.output_names(base.p, "height" in base.u), base.model)
 
 
 def members_of(x: SteadyState, blades: int) -> Int[np.ndarray, "B n"]:

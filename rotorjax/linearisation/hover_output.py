@@ -1,95 +1,45 @@
-"""What `rotorjax linearise` leaves behind of a hover in the free wake: models, README, pictures, json, report.md."""
+"""What a hover in the free wake tells beside what all linear rotors do: growing modes, horizon, steps."""
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from rotorjax.bench import plotting
 from rotorjax.bench.markdown import table
 from rotorjax.bench.plotting import INK, new_figure, series_colours, style
-from rotorjax.io.atomic import write_json, write_text
 from rotorjax.linearisation.compact import HIGHEST
-from rotorjax.linearisation.flight_output import mode_content
-from rotorjax.linearisation.handover import Time, handed_over, save
 from rotorjax.linearisation.hover_flight import LinearHover
 from rotorjax.linearisation.hover_small import HORIZON
-from rotorjax.trim.run import numbers
+from rotorjax.linearisation.told import by_name, pairs, part_of
 
 SHOWN = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"), ("lambda_0", "theta_0"), ("CT", "height"))
 """Steps that are drawn, as far as they are there."""
 
 
-def write(found: LinearHover, folder: Path, time: Time = "seconds") -> dict[str, Any]:
-    """Write every result into a folder that exists, and return the content of linearise.json."""
-    request, title = found.result.request, title_of(found)
-    models = {"reduced": found.small.model, "full": found.model.linear()}
-    save({k: handed_over(v, request.rotor, request.operating, time) for k, v in models.items()}, folder, title)
-    plotting.save(roots(found), folder / "roots")
-    plotting.save(steps(found), folder / "steps")
-    content = summary(found) | {"time": time}
-    write_json(folder / "linearise.json", content)
-    write_text(folder / "report.md", report(found, title))
-    return content
-
-
-def title_of(found: LinearHover) -> str:
-    """The flight in words."""
-    request = found.result.request
-    place = "out of ground effect" if request.height is None else f"h = {request.height:g} R"
-    return f"{request.rotor.name} in its free wake, C_T = {found.result.means.CT:.5f}, hover, {place}"
+def pictures(found: LinearHover) -> dict[str, Figure]:
+    """By the name of their file."""
+    return {"roots": roots(found), "steps": steps(found)}
 
 
 def summary(found: LinearHover) -> dict[str, Any]:
-    """Content of linearise.json: azimuth is time, rotor units; errors by output, then input, null where absent."""
-    model, small = found.model, found.small
-
-    def by_name(values: np.ndarray) -> dict[str, dict[str, float | None]]:
-        clean = [[None if np.isnan(v) else float(v) for v in row] for row in values]
-        return {q: dict(zip(model.inputs, row, strict=True)) for q, row in zip(model.outputs, clean, strict=True)}
-
-    def signals(names: Sequence[str], values: np.ndarray) -> dict[str, float]:
-        return {name: float(value) for name, value in zip(names, values, strict=True)}
-
+    """Its own content of linearise.json."""
+    small = found.small
     return {
-        "trim": numbers(found.result),
-        "inputs": signals(model.inputs, model.u),
-        "outputs": signals(model.outputs, model.y),
-        "states": model.order,
+        "states": found.model.order,
         "unstable_modes": found.unstable,
-        "reduced_order": small.model.order,
-        "reduced_states": list(small.model.states),
-        "reduced_unstable_modes": small.unstable,
         "reduced_growth": small.growth,
         "horizon_rev": small.horizon / (2 * np.pi),
-        "reduced_step_error": by_name(small.step_error),
-        "reduced_gap_db": by_name(small.gap_db),
-        "reduced_gap_deg": by_name(small.gap_deg),
-        "highest_per_rev": HIGHEST,
-        "modes": [mode_content(mode) for mode in found.modes],
-        "stages_s": found.seconds,
+        "reduced_step_error": by_name(found.full, small.step_error),
     }
 
 
-def report(found: LinearHover, title: str) -> str:
-    """The report in Markdown."""
+def report(found: LinearHover) -> str:
+    """Its own part of the report."""
     model, small = found.model, found.small
-    rows = [
-        (m.name, m.exponent.real, m.exponent.imag, ", ".join(f"{k} {v:.2f}" for k, v in list(m.states.items())[:4]))
-        for m in found.modes
-    ]
-    pairs = [
-        (f"{out} per {name}", 100 * small.step_error[q, m], small.gap_db[q, m], small.gap_deg[q, m])
-        for m, name in enumerate(model.inputs)
-        for q, out in enumerate(model.outputs)
-        if not np.isnan(small.gap_db[q, m])
-    ]
+    rows = [(m.name, m.exponent.real, m.exponent.imag, part_of(m)) for m in found.modes]
+    errors = pairs(found.full, small.gap_db, 100 * small.step_error, small.gap_db, small.gap_deg)
     growing = ", ".join(f"{count} of {name}" for name, count in found.unstable.items())
-    times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in found.seconds.items())
     return (
-        f"# Linear model: {title}\n\n"
         f"{model.order} states of blades and wake, time-invariant seen from the hub; {small.model.order} in the "
         f"reduced model, the blades' as they are.\n\n## Growing modes\n\n"
         f"The wake's vortices pair: modes with Re λ ≥ 0 by coordinate: {growing}. Nothing is projected out, for "
@@ -102,7 +52,7 @@ def report(found: LinearHover, title: str) -> str:
         + table(("mode", "growth", "frequency", "who takes part"), rows)
         + "\n\n![Roots](roots.png)\n\n## Errors of the reduced model\n\n"
         "Of a step over the horizon, over the full response's largest value; and on iω, "
-        f"up to {HIGHEST:g}/rev.\n\n" + table(("response", "step, %", "dB", "deg"), pairs) + f"\n\n## Time\n\n{times}\n"
+        f"up to {HIGHEST:g}/rev.\n\n" + table(("response", "step, %", "dB", "deg"), errors)
     )
 
 
@@ -141,19 +91,16 @@ def roots(found: LinearHover) -> Figure:
         axes.axvline(0, color=INK, lw=0.8)
         for (name, values), colour in zip(kinds.items(), series_colours(len(kinds)), strict=True):
             axes.plot(np.real(values), np.imag(values), "o", color=colour, label=name)
-        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=title_of(found))
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev")
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
 
-def lines(found: LinearHover) -> str:
-    """What the command prints."""
+def lines(found: LinearHover) -> list[str]:
+    """What the command prints of it."""
     small = found.small
-    text = [
-        title_of(found),
+    return [
         f"{found.model.order} states, {sum(found.unstable.values())} growing modes; reduced to {small.model.order} "
         f"with {small.unstable} growing, for {small.horizon / (2 * np.pi):g} revolution: error of a step "
-        f"{100 * np.median(small.step_error):.2g} % in the median of all responses",
+        f"{100 * np.median(small.step_error):.2g} % in the median of all responses"
     ]
-    text += [f"  {m.name:<34} {m.exponent.real:+.4f} {m.exponent.imag:+.4f}i per radian" for m in found.modes]
-    return "\n".join(text)

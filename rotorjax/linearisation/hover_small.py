@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Complex, Float, Int
 
-from rotorjax.linearisation.compact import HIGHEST, check_order, frequencies, gaps, readable
+from rotorjax.linearisation.compact import HIGHEST, Compact, check_order, frequencies, gaps, readable
 from rotorjax.linearisation.hover import HoverModel, Wave
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.reduction import even, history_gap, sample
@@ -30,16 +30,12 @@ REST = "rest"
 
 
 @dataclass(frozen=True)
-class SmallHover:
-    """A reduced model. step_error (q, m): largest difference of a step over `horizon`, over the full one's largest
-    value. gap_db, gap_deg: on iω, as in `compact.Compact`. unstable: its modes with Re λ ≥ 0. growth: σ.
+class SmallHover(Compact):
+    """A reduced model, gap_db and gap_deg on iω. step_error (q, m): largest difference of a step over `horizon`, over
+    the full one's largest value. growth: σ.
     """
 
-    model: LinearModel
     step_error: Float[np.ndarray, "q m"]
-    gap_db: Float[np.ndarray, "q m"]
-    gap_deg: Float[np.ndarray, "q m"]
-    unstable: int
     growth: float
     horizon: float = HORIZON
 
@@ -70,7 +66,7 @@ def small_hover(model: HoverModel, order: int) -> SmallHover:
     freq = frequencies()
     gap = gaps(model.response(freq), best.response(freq))
     unstable = int(np.sum(np.real(np.linalg.eigvals(joined.a)) >= 0))
-    return SmallHover(joined, history_gap(truth, best.step(times)), *gap, unstable, share * growth)
+    return SmallHover(joined, *gap, unstable, history_gap(truth, best.step(times)), share * growth)
 
 
 def _shared(waves: tuple[Wave, ...], kept: np.ndarray, order: int, sigma: float) -> tuple[Wave, ...]:

@@ -1,18 +1,18 @@
 """An inflow of three states in Pitt and Peters' form whose constants come from the free wake: small enough to fly with.
 
-    M λ̇ + K λ = (δC_T, δC_c, δC_s),   λ = (λ_0, λ_1c, λ_1s)
-    M = diag(m_0, m_1, m_1),   K = [[k_0, 0, 0], [0, k_1, c], [0, −c, k_1]]
+    M λ̇ + K λ = (δC_T, δC_c, δC_s),   λ = (λ_0, λ_1c, λ_1s),   M = diag(m_0, m_c, m_s)
 
-about a hover: deviations per radian of azimuth, in rotor units. Pitt and Peters have m_0 = 8/3π, m_1 = 16/45π, c = 0
-and, of a hover's λ, k_0 = 4λ and k_1 = λ. What thrust and moments do to the blades, and the blades and the inflow to
-them, is the rotor's own linear model with Pitt and Peters' inflow, in which only M and K are changed. They are fitted
-to steps of the linear rotor in its free wake over one revolution, thrust, flapping and hub moments together, by
-Levenberg and Marquardt's method with exact derivatives through the matrix exponential.
+about a hover or a flight: deviations per radian of azimuth, in rotor units. Pitt and Peters have m_0 = 8/3π, m_c = m_s
+= 16/45π and, of a hover's λ, K = diag(4λ, λ, λ). What thrust and moments do to the blades, and the blades and the
+inflow to them, is the rotor's own linear model with Pitt and Peters' inflow, in which only M and K are changed. They
+are fitted to steps of the linear rotor in its free wake over one revolution, thrust, flapping and hub moments together,
+by Levenberg and Marquardt's method with exact derivatives through the matrix exponential. Over a revolution and not on
+iω, because a hovering wake grows.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -23,58 +23,83 @@ from jax.scipy.linalg import expm
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.inflow.momentum import APPARENT_MASS
-from rotorjax.inflow.pitt_peters import GRADIENT_MASS
-from rotorjax.linearisation.hover import HoverModel
+from rotorjax.inflow.interface import DiskLoads
+from rotorjax.inflow.pitt_peters import PittPeters
 from rotorjax.ode.models import LinearModel
+from rotorjax.trim.problem import inputs_at
+from rotorjax.trim.solve import Trimmed
 
-INPUTS = ("theta_0", "theta_1c", "w", "q")
-"""Whose steps are fitted: what θ₁s and p do is the same a quarter turn further."""
+INPUTS = ("theta_0", "theta_1c", "theta_1s", "w", "p", "q")
+"""Whose steps are fitted."""
 OUTPUTS = ("CT", "beta_0", "beta_1c", "beta_1s", "L", "M")
 INFLOW = ("lambda_0", "lambda_1c", "lambda_1s")
+NAMES = ("m_0", "m_c", "m_s", "k_00", "k_0c", "k_0s", "k_c0", "k_cc", "k_cs", "k_s0", "k_sc", "k_ss")
 TIMES = np.linspace(0, 2 * np.pi, 49)
 """Of the steps, rad."""
 FLOOR = 0.05
 """Share of an output's largest response, over the inputs, below which one counts as absent."""
 
 
-class Constants(NamedTuple):
-    """m_0, k_0, m_1, k_1, c of the module's equation, each ()."""
+class Stepped(Protocol):
+    """A linear model, or a hover's by wave number."""
 
-    m_0: Array | float
-    k_0: Array | float
-    m_1: Array | float
-    k_1: Array | float
-    c: Array | float
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def step(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N q m"]:
+        """Outputs after unit steps of the inputs."""
+        ...
+
+
+class Inflow(NamedTuple):
+    """Diagonal of M (3,) and K (3, 3) of the module's equation."""
+
+    mass: Float[Array, "3"]
+    stiffness: Float[Array, "3 3"]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """Constants fitted and Pitt and Peters' own, with their errors (`error_of`). height: over R, infinite out of ground
-    effect.
+    """The inflow fitted and Pitt and Peters' own, with their errors (`error_of`). advance: over ΩR; height: over R,
+    infinite out of ground effect.
     """
 
-    constants: Constants
+    inflow: Inflow
     error: float
-    pitt_peters: Constants
+    pitt_peters: Inflow
     pitt_peters_error: float
+    advance: float
     height: float
 
 
-def identified(model: HoverModel, rotor: LinearModel, height: float = np.inf) -> Identified:
-    """Fit the constants. rotor: linear model of the same hover with Pitt and Peters' inflow, all states.
+def identified(
+    model: Stepped, rotor: LinearModel, start: Inflow, advance: float = 0.0, height: float = np.inf
+) -> Identified:
+    """Fit an inflow. rotor: linear model of the same flight with Pitt and Peters' inflow, all states. start: `own`.
 
     Raises InputError where one of the models lacks a name of INPUTS, OUTPUTS or INFLOW.
     """
-    target, start = target_of(model, rotor), own_constants(rotor)
+    target = target_of(model, rotor)
 
     def left(z: Array, target: Target) -> Array:
-        return ((steps(rotor, _constants(z, start)) - target.steps) * target.weight).ravel()
+        return ((steps(rotor, start, _moved(z, start)) - target.steps) * target.weight).ravel()
 
     solver = optimistix.LevenbergMarquardt(rtol=1e-6, atol=1e-8)
-    found = _constants(optimistix.least_squares(left, solver, jnp.zeros(5), target, max_steps=200).value, start)
-    found = Constants(*map(float, found))
-    return Identified(found, error_of(found, target, rotor), start, error_of(start, target, rotor), height)
+    z = optimistix.least_squares(left, solver, jnp.zeros(12), target, max_steps=200).value
+    found = _moved(z, start)
+    errors = [error_of(inflow, start, target, rotor) for inflow in (found, start)]
+    return Identified(found, errors[0], start, errors[1], advance, height)
+
+
+def own(trimmed: Trimmed) -> Inflow:
+    """Pitt and Peters' own, of the mean inflow of a trim with it. Raises InputError for one with another inflow."""
+    model = trimmed.p.inflow
+    if not isinstance(model, PittPeters):
+        raise InputError("Argument `trimmed` must be a trim with inflow 'pitt-peters', but has another")
+    still = DiskLoads(*(jnp.zeros(shape) for shape in ((1, 1), (1, 1, 3), (1,), (1,), (1,), ())))
+    inputs = inputs_at(trimmed.z.controls, trimmed.flight)
+    slope = jax.jacfwd(lambda state: model.rate(state, still, inputs))(jnp.mean(trimmed.z.inflow, axis=0))
+    return Inflow(model.mass, -model.mass[:, None] * slope)
 
 
 class Target(NamedTuple):
@@ -84,7 +109,7 @@ class Target(NamedTuple):
     weight: Array
 
 
-def target_of(model: HoverModel, rotor: LinearModel) -> Target:
+def target_of(model: Stepped, rotor: LinearModel) -> Target:
     """Steps of a free wake's model. Raises InputError where a name is missing."""
     for what, names, owned in (
         ("inputs", INPUTS, (model.inputs, rotor.inputs)),
@@ -102,53 +127,30 @@ def target_of(model: HoverModel, rotor: LinearModel) -> Target:
     return Target(jnp.asarray(truth), jnp.asarray(np.where(there, 1 / np.where(there, top, 1.0), 0.0)))
 
 
-def error_of(constants: Constants, target: Target, rotor: LinearModel) -> float:
+def error_of(inflow: Inflow, start: Inflow, target: Target, rotor: LinearModel) -> float:
     """Rms of a step over the revolution, over its largest value, mean over the responses that are there."""
-    rms = jnp.sqrt(jnp.mean(((steps(rotor, constants) - target.steps) * target.weight) ** 2, axis=0))
+    rms = jnp.sqrt(jnp.mean(((steps(rotor, start, inflow) - target.steps) * target.weight) ** 2, axis=0))
     return float(jnp.sum(rms) / jnp.sum(target.weight > 0))
 
 
-def interpolated(one: Identified, other: Identified, height: float) -> Constants:
-    """Constants at a height between two others, linear in 1/h: what a simulator does with the table."""
-    here, there, at = 1 / one.height, 1 / other.height, 1 / height
-    share = (at - here) / (there - here)
-    pairs = zip(one.constants, other.constants, strict=True)
-    return Constants(*((1 - share) * float(a) + share * float(b) for a, b in pairs))
+def _moved(z: Float[Array, "12"], start: Inflow) -> Inflow:
+    """Positive masses by their logarithms over the start's, the rest in units of the start's diagonal."""
+    size = jnp.sqrt(jnp.abs(jnp.diagonal(start.stiffness)))
+    return Inflow(start.mass * jnp.exp(z[:3]), start.stiffness + size[:, None] * size * z[3:].reshape(3, 3))
 
 
-def own_constants(rotor: LinearModel) -> Constants:
-    """Pitt and Peters' own of a linear model: M as they have it, K of the mean inflow that it was linearised about."""
-    row = [rotor.states.index(name) for name in INFLOW]
-    flow = float(rotor.x[row[0]])
-    return Constants(APPARENT_MASS, 4 * flow, GRADIENT_MASS, flow, 0.0)
+def changed(rotor: LinearModel, start: Inflow, inflow: Inflow) -> tuple[Array, Array]:
+    """A and B of a linear rotor whose inflow is another; its loads stay. start: the inflow that it has."""
+    row = np.array([rotor.states.index(name) for name in INFLOW])
+    loads, direct = start.mass[:, None] * rotor.a[row], start.mass[:, None] * rotor.b[row]  # M λ̇ = loads − K λ
+    loads = loads.at[:, row].add(start.stiffness - inflow.stiffness)
+    a, b = jnp.asarray(rotor.a), jnp.asarray(rotor.b)
+    return a.at[row].set(loads / inflow.mass[:, None]), b.at[row].set(direct / inflow.mass[:, None])
 
 
-def _constants(z: Array, start: Constants) -> Constants:
-    """Positive masses and gains, by their logarithms over the start's."""
-    m_0, k_0, m_1, k_1 = jnp.asarray(start[:4]) * jnp.exp(z[:4])
-    return Constants(m_0, k_0, m_1, k_1, start.k_1 * z[4])
-
-
-def changed(rotor: LinearModel, constants: Constants) -> tuple[Array, Array]:
-    """A and B of a linear rotor whose inflow has other constants; its loads stay."""
-    own, row = own_constants(rotor), np.array([rotor.states.index(name) for name in INFLOW])
-    mass, stiff = _matrices(own)
-    loads, direct = mass @ rotor.a[row], mass @ rotor.b[row]  # M λ̇ = loads − K λ
-    mass, new = _matrices(constants)
-    loads = jnp.asarray(loads).at[:, row].add(stiff - new)
-    back = jnp.diag(1 / jnp.diagonal(mass))
-    return jnp.asarray(rotor.a).at[row].set(back @ loads), jnp.asarray(rotor.b).at[row].set(back @ direct)
-
-
-def _matrices(v: Constants) -> tuple[Array, Array]:
-    mass, zero = jnp.diag(jnp.stack([jnp.asarray(m) for m in (v.m_0, v.m_1, v.m_1)])), jnp.zeros(())
-    rows = ((v.k_0, zero, zero), (zero, v.k_1, v.c), (zero, -jnp.asarray(v.c), v.k_1))
-    return mass, jnp.stack([jnp.stack([jnp.asarray(entry) for entry in row]) for row in rows])
-
-
-def steps(rotor: LinearModel, constants: Constants) -> Float[Array, "N q m"]:
-    """OUTPUTS at TIMES after unit steps of INPUTS, of a rotor whose inflow has these constants."""
-    a, b = changed(rotor, constants)
+def steps(rotor: LinearModel, start: Inflow, inflow: Inflow) -> Float[Array, "N q m"]:
+    """OUTPUTS at TIMES after unit steps of INPUTS, of a rotor whose inflow is another than the one it has."""
+    a, b = changed(rotor, start, inflow)
     m = np.array([rotor.inputs.index(name) for name in INPUTS])
     q = np.array([rotor.outputs.index(name) for name in OUTPUTS])
     n, b = rotor.order, b[:, m]
@@ -163,24 +165,54 @@ def steps(rotor: LinearModel, constants: Constants) -> Float[Array, "N q m"]:
 
 
 def table(found: Sequence[Identified]) -> xr.Dataset:
-    """Constants and errors over height, infinite out of ground effect: what a flight simulator interpolates in."""
-    columns = {name: [getattr(one.constants, name) for one in found] for name in Constants._fields}
-    columns |= {f"pitt_peters_{name}": [getattr(one.pitt_peters, name) for one in found] for name in Constants._fields}
-    columns["tau_0"] = [one.constants.m_0 / one.constants.k_0 for one in found]
-    columns["tau_1"] = [one.constants.m_1 / one.constants.k_1 for one in found]
-    columns |= {"error": [one.error for one in found], "pitt_peters_error": [one.pitt_peters_error for one in found]}
-    data = xr.Dataset({name: ("height", np.asarray(values, float)) for name, values in columns.items()})
-    equation = (
-        "M dλ/dψ + K λ = (δC_T, δC_c, δC_s), M = diag(m_0, m_1, m_1), K = [[k_0, 0, 0], [0, k_1, c], [0, -c, k_1]]"
+    """Constants and errors over advance ratio and height, infinite out of ground effect: what a flight simulator
+    interpolates in. NaN where there is none.
+    """
+    speeds, heights = sorted({one.advance for one in found}), sorted({one.height for one in found})
+    names = (
+        *NAMES,
+        *(f"pitt_peters_{name}" for name in NAMES),
+        "tau_0",
+        "tau_c",
+        "tau_s",
+        "error",
+        "pitt_peters_error",
     )
-    return data.assign_coords(height=("height", [one.height for one in found], {"units": "R"})).assign_attrs(
+    values = np.full((len(names), len(speeds), len(heights)), np.nan)
+    for one in found:
+        flat = [np.concatenate([np.ravel(part) for part in inflow]) for inflow in (one.inflow, one.pitt_peters)]
+        times = one.inflow.mass / np.diagonal(one.inflow.stiffness)
+        row = np.concatenate([*flat, times, [one.error, one.pitt_peters_error]])
+        values[:, speeds.index(one.advance), heights.index(one.height)] = row
+    data = xr.Dataset({name: (("advance_ratio", "height"), part) for name, part in zip(names, values, strict=True)})
+    equation = "M dλ/dψ + K λ = (δC_T, δC_c, δC_s), M = diag(m_0, m_c, m_s), K = [[k_00, k_0c, k_0s], …]"
+    return data.assign_coords(advance_ratio=speeds, height=("height", heights, {"units": "R"})).assign_attrs(
         equation=equation, units="time: azimuth (rad), velocity: ΩR, loads: ρA(ΩR)² and ρA(ΩR)²R"
     )
 
 
+def interpolated(data: xr.Dataset, advance: float, height: float = np.inf) -> Inflow:
+    """The inflow between those of a full table, linear in speed and in 1/height: what a simulator does with it.
+
+    Raises InputError for a flight outside the table.
+    """
+    near = data[list(NAMES)].assign_coords(height=1 / data["height"]).sortby("height")
+    for name, value in (("advance_ratio", advance), ("height", 1 / height)):
+        near = near.sel({name: value}) if value in near[name] else near.interp({name: value})
+    flat = np.array([float(near[name]) for name in NAMES])
+    if not np.all(np.isfinite(flat)):
+        raise InputError(
+            f"Arguments `advance` and `height` must lie within the table, but are {advance:g} and {height:g}"
+        )
+    return Inflow(jnp.asarray(flat[:3]), jnp.asarray(flat[3:].reshape(3, 3)))
+
+
 def text(data: xr.Dataset) -> str:
-    """The table in columns."""
-    names = ["height", *map(str, data.data_vars)]
-    rows = [" ".join(f"{name:>28}" for name in names)]
-    rows += [" ".join(f"{float(data[name][k]):>28.6g}" for name in names) for k in range(data.sizes["height"])]
+    """The table in columns, a flight a row."""
+    names = [str(name) for name in data.data_vars]
+    places = [(mu, h) for mu in data["advance_ratio"].values for h in data["height"].values]
+    rows = [" ".join(f"{name:>18}" for name in ("advance_ratio", "height", *names))]
+    for mu, h in places:
+        here = data.sel(advance_ratio=mu, height=h)
+        rows.append(" ".join(f"{value:>18.6g}" for value in (mu, h, *(float(here[name]) for name in names))))
     return f"# {data.attrs['equation']}\n# {data.attrs['units']}\n" + "\n".join(rows) + "\n"

@@ -142,10 +142,7 @@ def linear_rotor(
     Raises InputError where the trim has not converged or a name is unknown.
     """
     start = jax.tree.map(lambda leaf: leaf[0], base.orbit.x)
-    known = output_names(base.p, "height" in base.u)
-    check_names("inputs", inputs, drive_names(base.u), base.model)
-    check_names("outputs", kept, known, base.model)
-    chosen = [name for name in known if not name.startswith(readings.LIFT)] if kept is None else list(kept)
+    ins, outs = chosen_names(base, inputs, kept)
 
     def derivative(psi: Array, x: SteadyState) -> tuple[np.ndarray, np.ndarray]:
         return value_and_jacobian(_joint, (x, base.u), psi, base.p, chunk=chunk)
@@ -156,8 +153,8 @@ def linear_rotor(
         base.orbit,
         base.u,
         base.p,
-        inputs=drive_names(base.u) if inputs is None else inputs,
-        outputs=chosen,
+        inputs=ins,
+        outputs=outs,
         units=drive.UNITS,
         derivative=derivative,
     )
@@ -167,6 +164,17 @@ def linear_rotor(
         notes=notes(base),
     )  # fmt: skip
     return replace(found, period=2 * np.pi) if base.steady else unfolded(found, base.p.rotor.blades)
+
+
+def chosen_names(
+    base: Base, inputs: Sequence[str] | None, outputs: Sequence[str] | None
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of inputs and outputs, None for all but section loads. Raises InputError for one that is unknown."""
+    ins, outs = drive_names(base.u), output_names(base.p, "height" in base.u)
+    check_names("inputs", inputs, ins, base.model)
+    check_names("outputs", outputs, outs, base.model)
+    usual = tuple(name for name in outs if not name.startswith(readings.LIFT))
+    return ins if inputs is None else tuple(inputs), usual if outputs is None else tuple(outputs)
 
 
 def drive_names(u: Drive) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from rotorjax.linearisation.drive import UNITS
 from rotorjax.linearisation.rotor import Base, outputs, rates
 from rotorjax.ode.labels import labels
 from rotorjax.ode.models import PeriodicModel
+from rotorjax.ode.runge_kutta import RK5, ButcherTableau
 from rotorjax.ode.trajectory import march
 
 SIZES = {"rad": float(np.deg2rad(0.05)), "ΩR": 3e-4, "Ω": 1e-4, "Ω²R": 3e-4, "Ω²": 1e-4, "R": 0.003}
@@ -32,18 +33,25 @@ def _read(times, states, u, p):
 
 
 def marched(
-    base: Base, names: Sequence[str], chosen: Sequence[str], samples: int = SAMPLES, each: int = STEPS
+    base: Base,
+    names: Sequence[str],
+    chosen: Sequence[str],
+    samples: int = SAMPLES,
+    each: int = STEPS,
+    tableau: ButcherTableau = RK5,
 ) -> Float[np.ndarray, "N q m"]:
     """Deviation of the chosen outputs over a revolution after a step of each input (SIZES) at ψ = 0, from the march
-    without one; `each` steps from one of the samples to the next. Raises InputError where a march leaves the finite
-    numbers.
+    without one; `each` steps from one of the samples to the next, by a method. Raises InputError where a march leaves
+    the finite numbers.
     """
     start = jax.tree.map(lambda leaf: leaf[0], base.orbit.x)
     columns: list[int] = []
 
     def responses(u) -> np.ndarray:
         step = 2 * np.pi / (samples * each)
-        path = march(rates, start, 0.0, step, samples * each, u, base.p, save_every=each, progress=False)
+        path = march(
+            rates, start, 0.0, step, samples * each, u, base.p, save_every=each, progress=False, tableau=tableau
+        )
         if not path.finished:
             raise InputError(f"Argument `about` must be a trim that can be marched, but the march is {path.why}")
         read = _read(path.t, path.x, u, base.p)

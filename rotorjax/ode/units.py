@@ -8,7 +8,7 @@ import numpy as np
 
 from rotorjax.ode.models import LinearModel, PeriodicModel
 
-Model = TypeVar("Model", LinearModel, PeriodicModel)
+Model = TypeVar("Model", bound=LinearModel | PeriodicModel)
 Units = Mapping[str, tuple[float, str]]
 
 

@@ -6,10 +6,10 @@
         state = march.step(state, replace(march.inputs, theta_0=...))
 
 A step is one of Runge and Kutta's classical ones, with controls held over it. A free wake is marched on the solution of
-its lifting line (wake/lifting_line.py), with sums by matrix products (wake/kernel_sweeps.py), and at choice in single
-precision and with what its closure and the ground induce summed once a step, or every other step, and carried on along
-a straight line through the sum before. Seen from the blades that changes slowly; it is four fifths of all pairs in
-hover over ground.
+its lifting line (wake/lifting_line.py), whose filter, too fast for a step of 15 degrees, is taken exactly
+(ode/exponential.py), with sums by matrix products (wake/kernel_sweeps.py), and at choice in single precision and with
+what its closure and the ground induce summed once a step, or every other step, and carried on along a straight line
+through the sum before. Seen from the blades that changes slowly; it is four fifths of all pairs in hover over ground.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from rotorjax.coupled import Coupled, CoupledState, Outputs, old_induced, rate_a
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.device import full_products, on_cpu
 from rotorjax.errors import InputError
-from rotorjax.ode.runge_kutta import RK4, told_step
+from rotorjax.ode import exponential, runge_kutta
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import OldAge, Precision
 from rotorjax.simulation.start import Start, from_result
@@ -83,10 +83,27 @@ def advance(
             old = sums[0] + (since + (s - t) / dt) / state.every * (sums[0] - sums[1])
         return rate_and_output(s, x, inputs(s), p, old)
 
-    x, y = told_step(rate, t, state.x, dt, tableau=RK4)
+    x, y = _told_step(rate, t, state.x, dt, p)
     finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(x)]).all()
     x = eqx.tree_at(lambda x: x.psi, x, jnp.mod(x.psi, 2 * np.pi))
     return MarchState(x, y, state.steps + 1, finite, sums, state.every)
+
+
+def _told_step(
+    rate: Callable[[Array, CoupledState], tuple[CoupledState, Outputs]],
+    t: Float[Array, ""],
+    x: CoupledState,
+    dt: Float[Array, ""],
+    p: Coupled,
+) -> tuple[CoupledState, Outputs]:
+    """A step and the outputs at its start. The filter of a bound circulation that follows the solution of its line
+    decays at 1/τ and no faster; what follows a pass has no rate that is known beforehand.
+    """
+    if not isinstance(p, CoupledWake) or p.settings.bound_filter == "pass":
+        return runge_kutta.told_step(rate, t, x, dt, tableau=runge_kutta.RK4)
+    still = jax.tree.map(lambda _: 0.0, x)
+    decay = eqx.tree_at(lambda x: x.inflow.gamma_bound, still, 1 / p.settings.circulation_lag)
+    return exponential.told_step(rate, t, x, dt, decay)
 
 
 def _summed(state: MarchState, u: RotorInputs, p: Coupled) -> Float[Array, "2 B N 3"]:

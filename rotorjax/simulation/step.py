@@ -47,12 +47,12 @@ def usual_steps(start: Start) -> int:
 def least_steps(start: Start) -> int:
     """Least steps of a revolution with which a free wake can be marched, a multiple of twelve; 1 without one.
 
-    Its transport along age allows one age step (5PBU4 with the classical Runge-Kutta method: 1.044), its bound
-    circulation STABLE over its fastest decay.
+    Its transport along age allows one age step (5PBU4 with the classical Runge-Kutta method: 1.044), a bound
+    circulation that follows passes STABLE over its fastest decay; that of the solution's filter is taken exactly.
     """
     if not isinstance(start.p, CoupledWake):
         return 1
-    decay = fastest_decay(start.x, start.inputs, start.p)
+    decay = fastest_decay(start.x, start.inputs, start.p) if start.p.settings.bound_filter == "pass" else 0.0
     return 12 * int(np.ceil(max(2 * np.pi * decay / STABLE, start.p.settings.steps_per_turn) / 12 - 1e-9))
 
 

@@ -16,15 +16,15 @@ from rotorjax.linearisation.readings import readings
 from rotorjax.ode.outcome import Outcome
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, dimensional, from_best, judged, refused
+from rotorjax.sweep.found import Found, Progress, Start, dimensional, judged, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 from rotorjax.trim import run as trimming
+from rotorjax.trim.free_wake import first_guess
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.means import evaluated
 from rotorjax.trim.problem import inputs_at, node_azimuths, rates_and_outputs
-from rotorjax.trim.run import FREE_WAKE, Request, Result, numbers
+from rotorjax.trim.run import FREE_WAKE, Request, numbers
 from rotorjax.trim.solve import Trimmed, guess
-from rotorjax.trim.verdict import verdict
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 READ = ("CT", "CP", "CP_induced", "CP_profile", "CP_parasite", "CP_damper", "figure_of_merit", "collective_deg")
@@ -60,8 +60,8 @@ def _azimuths(case: SweepCase, blades: int) -> dict:
 
 
 def solve(prepared: Sequence[Request], start: Start | None = None, progress: Progress | None = None) -> list[Found]:
-    """Trim one after the other from the same start."""
-    return [from_best(_solve, request, start, progress) for request in prepared]
+    """Trim one after the other from the same start, and from nothing where that leads nowhere."""
+    return [_solve(request, start, progress) for request in prepared]
 
 
 def _solve(request: Request, near: Start | None, progress: Progress | None) -> Found:
@@ -81,22 +81,24 @@ def _solve(request: Request, near: Start | None, progress: Progress | None) -> F
 
 
 def _state(trimmed: Trimmed | TrimmedInWake) -> dict[str, np.ndarray]:
-    """Unknowns of a trim in an inflow model, from which a neighbour's begins; a free wake's begins from nothing."""
-    if isinstance(trimmed, TrimmedInWake) or not trimmed.outcome.converged:
+    """Unknowns of a trim, from which a neighbour's begins."""
+    if not trimmed.outcome.converged:
         return {}
     return {f"{k:02d}": np.asarray(leaf) for k, leaf in enumerate(jax.tree.leaves(trimmed.z))}
 
 
-def _restored(near: Start) -> Result | None:
+def _restored(near: Start) -> Trimmed | TrimmedInWake:
     """A neighbour's trim, of its state."""
     state, request = near.found.state, near.prepared
-    if not state or request.inflow == FREE_WAKE:
-        return None
+    leaves = [jnp.asarray(state[name]) for name in sorted(state)]
+    there = Outcome(None, 0.0, (), 0, True, "kept", 0.0)
+    if request.inflow == FREE_WAKE:
+        p, controls, coning = trimming.before_wake(request)
+        z = first_guess(p, controls, coning, 1, 0.0)
+        return TrimmedInWake(jax.tree.unflatten(jax.tree.structure(z), leaves), p, there, 0)
     p, flight, residual = trimming.prepare(request)
-    structure = jax.tree.structure(guess(p, flight, request.azimuths))
-    z = jax.tree.unflatten(structure, [jnp.asarray(state[name]) for name in sorted(state)])
-    trimmed = Trimmed(z, Outcome(z, 0.0, (), 0, True, "kept", 0.0), residual, flight, p)
-    return Result(request, trimmed, trimming.means(trimmed), verdict(trimmed), 0.0)
+    z = guess(p, flight, request.azimuths)
+    return Trimmed(jax.tree.unflatten(jax.tree.structure(z), leaves), there, residual, flight, p)
 
 
 @eqx.filter_jit

@@ -33,11 +33,7 @@ def curve(wanted: Sequence[Request], progress: bool = True) -> list[Result]:
             bar.set_postfix_str(f"{stage}, residual {residual:.1e}")
 
         for request in bar:
-            near = last if last is not None and (last.request.height is None) == (request.height is None) else None
-            result = run(request, near, show)
-            if near is not None and not result.converged:
-                result = run(request, None, show)
-            if result.converged:
-                last = result
+            result = run(request, last, show)
+            last = result.trimmed if result.converged else last
             found.append(result)
     return found

@@ -165,14 +165,18 @@ def _rate(angle: Float[Array, " K"]) -> Float[Array, " K"]:
 
 def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices: int, inflow: float) -> InWake:
     """A prescribed wake carried by the wind, blades that cone and do not lag."""
-    wake = spread(prescribed(p.model, inflow), slices)
-    settings = p.model.settings
-    ages, near = settings.node_ages[1:], settings.near_ages
+    wake = carried(spread(prescribed(p.model, inflow), slices), p.model, -p.inputs.velocity)
+    return InWake(wake, jnp.full(slices, float(coning)), jnp.zeros(slices), controls)
+
+
+def carried(wake: Unknowns, model: FreeWake, wind: Float[Array, "3"]) -> Unknowns:
+    """A wake that a wind (hub frame, over ΩR) carries since its release, K slices in their blades' frames."""
+    slices = wake.near.shape[0]
+    ages, near = model.settings.node_ages[1:], model.settings.near_ages
     psi = 2 * np.pi / slices * np.arange(slices)
-    wind = rotate_about_shaft(jnp.broadcast_to(-p.inputs.velocity, (slices, 3)), -jnp.asarray(psi))
+    turned = rotate_about_shaft(jnp.broadcast_to(wind, (slices, 3)), -jnp.asarray(psi))
 
     def carry(nodes, age):
-        return nodes + age[:, None] * wind[:, None, None, :]
+        return nodes + age[:, None] * turned[:, None, None, :]
 
-    moved = wake._replace(near=carry(wake.near, ages[:near]), far=carry(wake.far, ages[near:]))
-    return InWake(moved, jnp.full(slices, float(coning)), jnp.zeros(slices), controls)
+    return wake._replace(near=carry(wake.near, ages[:near]), far=carry(wake.far, ages[near:]))

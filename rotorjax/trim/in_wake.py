@@ -1,15 +1,18 @@
 """Solving for trim in the free wake, and what it comes to.
 
-In hover the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts
-from a prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own. Where that
-is lost, in slow flight or near the ground, it starts with thicker cores far over the ground in an auxiliary flow down
-that carries the wake away, and follows the branch as the flow is taken back, the ground comes up and the cores thin.
+From a trim nearby the way leads straight to the case, the wake carried by what the wind changes. From nothing, in hover
+the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts from a
+prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own. Where that is
+lost, in slow flight or near the ground, it starts with thicker cores far over the ground in an auxiliary flow down that
+carries the wake away, and follows the branch as the flow is taken back, the ground comes up and the cores thin.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -26,7 +29,7 @@ from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.flap_lag import blade_of, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.trim.free_wake import InWake, WakeTrim, first_guess, flown, residual
+from rotorjax.trim.free_wake import InWake, WakeTrim, carried, first_guess, flown, residual
 from rotorjax.trim.problem import Aim
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
@@ -52,8 +55,8 @@ WASHOUT, FAR = 0.08, 4.0
 DIRECT, WASHED = 80, 80
 """Iterations of Anderson's from a prescribed wake; on the straight way a wake that needs more is lost."""
 
-LEAST = 0.01
-"""Least step of a continuation over the whole way."""
+LEAST, NEAREST = 0.01, 0.1
+"""Least step of a continuation over the whole way, and over that from a neighbour, which is to be short."""
 
 
 @dataclass(frozen=True)
@@ -105,17 +108,29 @@ def wake_trim(
     return WakeTrim(model, blade, inputs, jnp.asarray(thrust, float), aim)
 
 
+def alike(one: Any, other: Any) -> bool:
+    """Whether two trees differ in numbers alone."""
+    shapes = ([np.shape(leaf) for leaf in jax.tree.leaves(tree)] for tree in (one, other))
+    return jax.tree.structure(one) == jax.tree.structure(other) and next(shapes) == next(shapes)
+
+
 def windy(inputs: RotorInputs) -> bool:
     """Whether the hub moves across the air: then no azimuth is like another."""
     return bool(np.any(np.asarray(inputs.velocity)[:2] != 0))
 
 
 def trim_in_wake(
-    p: WakeTrim, controls: Float[Array, "3"], coning: float, progress: Progress | None = None
+    p: WakeTrim,
+    controls: Float[Array, "3"],
+    coning: float,
+    progress: Progress | None = None,
+    near: TrimmedInWake | None = None,
 ) -> TrimmedInWake:
-    """Trim from a guess of the controls θ₀, θ₁c, θ₁s and of the coning (rad).
+    """Trim from a trim nearby, and where there is none or the way from it is lost, from a guess of the controls θ₀,
+    θ₁c, θ₁s and of the coning (rad).
 
-    progress(stage, residual) is called as things go on. A trim that does not converge comes back with its reason.
+    near: of no use where its wake has other numbers of nodes or azimuths. progress(stage, residual) is called as things
+    go on. A trim that does not converge comes back with its reason.
     Raises InputError where the hub comes nearer to the ground or leaves it.
     """
     ground = p.model.ground
@@ -126,6 +141,10 @@ def trim_in_wake(
             f"{nearer:.3g} ΩR away from it: set climb = 0, and advance_ratio = 0 over a slope"
         )
     stages = _Stages(progress)
+    if near is not None and near.outcome.converged and alike(near.p, p):
+        found = _from_neighbour(p, near, stages)
+        if found.outcome.converged or stages.interrupted:
+            return found
     if windy(p.inputs):
         return _from_wind(p, controls, coning, stages)
     return _from_hover(p, controls, coning, stages)
@@ -153,6 +172,23 @@ class _Stages:
         least = SMALLEST_STEP if hard else 1 / 16
         found = newton(residual, z, p, linear=linear, tol=tol, max_iterations=12, smallest_step=least)
         return self.done(stage, found)
+
+
+def _from_neighbour(p: WakeTrim, near: TrimmedInWake, stages: _Stages) -> TrimmedInWake:
+    """All numbers of the case go evenly from the neighbour's to its own."""
+
+    def at(s: float) -> WakeTrim:
+        return (
+            p if s == 1 else jax.tree.map(lambda a, b: (1 - s) * a + s * b if eqx.is_inexact_array(b) else b, near.p, p)
+        )
+
+    def carry(z: InWake, here: float, there: float) -> InWake:
+        wind = (there - here) * (near.p.inputs.velocity - p.inputs.velocity)
+        return z._replace(wake=carried(z.wake, p.model, wind))
+
+    branch = _follow("trim", at, near.z, 1.0, stages, carry=carry, smallest=NEAREST)
+    last = branch.last if branch.reached or branch.failed is None else branch.failed
+    return TrimmedInWake(last.x, p, last if branch.reached else replace(last, converged=False), stages.iterations)
 
 
 def _from_hover(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
@@ -234,8 +270,10 @@ def _thinner(p: WakeTrim, x: InWake, factor: float, stages: _Stages) -> Branch:
     return _follow("trim", at, x, 1.0, stages)
 
 
-def _follow(stage: str, at: Callable[[float], WakeTrim], x: InWake, first: float, stages: _Stages) -> Branch:
-    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL."""
+def _follow(
+    stage: str, at: Callable[[float], WakeTrim], x: InWake, first: float, stages: _Stages, **more: Any
+) -> Branch:
+    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL. more: of `continuation`."""
 
     def step(guess, s, memory):
         last = s == 1 and stage == "trim"
@@ -244,7 +282,8 @@ def _follow(stage: str, at: Callable[[float], WakeTrim], x: InWake, first: float
             stages.nearest = found
         return found
 
-    return continuation(step, x, 0.0, 1.0, step=first, smallest=LEAST, largest=1.0, easy=5, jump=0.5)
+    kept = {"smallest": LEAST, "largest": 1.0, "easy": 5, "jump": 0.5}
+    return continuation(step, x, 0.0, 1.0, step=first, **kept | more)
 
 
 def _anderson(stage: str, guess: InWake, p: WakeTrim, most: int, stages: _Stages) -> Outcome:

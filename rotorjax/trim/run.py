@@ -8,6 +8,7 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from rotorjax.checks import check_number, closest, shown
 from rotorjax.coupled import CoupledRotor, coupled_rotor
@@ -20,10 +21,11 @@ from rotorjax.rotor import catalogue
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor, solidity
 from rotorjax.trim import problem
-from rotorjax.trim.in_wake import TrimmedInWake, trim_in_wake, wake_trim
+from rotorjax.trim.free_wake import WakeTrim
+from rotorjax.trim.in_wake import TrimmedInWake, alike, trim_in_wake, wake_trim
 from rotorjax.trim.means import Means, means
 from rotorjax.trim.problem import Aim, TrimResidual, inputs_at, outputs_at
-from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, trim
+from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, guess, trim
 from rotorjax.trim.verdict import Verdict, verdict
 from rotorjax.wake.settings import WakeSettings
 
@@ -121,15 +123,15 @@ def check(request: Request) -> None:
         inflow_model(request.inflow, request.ground)
 
 
-def run(request: Request, start: Result | None = None, progress: Progress | None = None) -> Result:
-    """Trim. start: a trim nearby, of no use to the free wake. progress(stage, residual): called now and then.
+def run(request: Request, start: Trimmed | TrimmedInWake | None = None, progress: Progress | None = None) -> Result:
+    """Trim. start: a trim nearby, of use where it has the same unknowns; where it leads nowhere the trim starts from
+    nothing. progress(stage, residual): called now and then.
 
     Raises InputError where something of the request is not allowed or the thrust is out of reach.
     """
     begun = time.perf_counter()
     check(request)
-    near = None if start is None or not isinstance(start.trimmed, Trimmed) else start.trimmed.z
-    found = _in_wake(request, progress) if request.inflow == FREE_WAKE else _in_model(request, near)
+    found = _in_wake(request, start, progress) if request.inflow == FREE_WAKE else _in_model(request, start)
     return Result(request, found, means(found), verdict(found), time.perf_counter() - begun)
 
 
@@ -140,24 +142,38 @@ def prepare(request: Request) -> tuple[CoupledRotor, problem.Flight, TrimResidua
     return p, request.flight, TrimResidual(request.rotor.blades, request.aim, request.drag_area is not None)
 
 
-def _in_model(request: Request, start: problem.Trim | None) -> Trimmed:
-    return trim(*prepare(request), start, request.azimuths)
+def _in_model(request: Request, start: Trimmed | TrimmedInWake | None = None) -> Trimmed:
+    p, condition, residual = prepare(request)
+    unknowns = guess(p, condition, request.azimuths)
+    if isinstance(start, Trimmed) and alike((start.z, start.flight), (unknowns, condition)):
+        found = trim(p, condition, residual, start.z, request.azimuths)
+        if found.outcome.converged:
+            return found
+    return trim(p, condition, residual, None, request.azimuths)
 
 
-def _in_wake(request: Request, progress: Progress | None) -> TrimmedInWake:
-    """Controls and coning are first guessed with Pitt-Peters' inflow; a fuselage's drag is balanced by its tilt."""
-    guess = _in_model(replace(request, inflow="pitt-peters", height=None, slope_deg=0.0), None)
-    if not guess.outcome.converged:
+def _in_wake(
+    request: Request, start: Trimmed | TrimmedInWake | None = None, progress: Progress | None = None
+) -> TrimmedInWake:
+    near = start if isinstance(start, TrimmedInWake) else None
+    return trim_in_wake(*before_wake(request), progress, near)
+
+
+def before_wake(request: Request) -> tuple[WakeTrim, Float[Array, "3"], float]:
+    """A trim in the free wake set up, its controls (rad) and its coning (rad) guessed with Pitt-Peters' inflow; a
+    fuselage's drag is balanced by the tilt that this has. Raises InputError where even that finds none.
+    """
+    first = _in_model(replace(request, inflow="pitt-peters", height=None, slope_deg=0.0))
+    if not first.outcome.converged:
         raise InputError(
             f"Argument `thrust_coefficient` must be within the rotor's reach, but at {request.thrust:g} no trim is "
-            f"found even with Pitt-Peters' inflow ({guess.outcome.why}): lower it"
+            f"found even with Pitt-Peters' inflow ({first.outcome.why}): lower it"
         )
-    controls = guess.z.controls
-    coning = float(jnp.mean(outputs_at(guess.z, guess.flight, guess.p).flap))
-    inputs = inputs_at(controls, guess.flight)
+    controls = first.z.controls
+    coning = float(jnp.mean(outputs_at(first.z, first.flight, first.p).flap))
+    inputs = inputs_at(controls, first.flight)
     p = wake_trim(request.rotor, request.operating, inputs, request.thrust, request.ground, request.wake, request.aim)
-    start = jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s])
-    return trim_in_wake(p, start, coning, progress)
+    return p, jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s]), coning
 
 
 def numbers(result: Result) -> dict[str, Any]:
@@ -165,6 +181,8 @@ def numbers(result: Result) -> dict[str, Any]:
     request, outcome, flown = result.request, result.trimmed.outcome, result.means
     names = ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s", "lag_0")
     angles = np.rad2deg([*flown.controls, *flown.flap, flown.lag[0]])
+    tip = float(request.operating.tip_speed(request.rotor.radius))
+    force = float(request.operating.density) * np.pi * float(request.rotor.radius) ** 2 * tip**2
     return {
         "rotor": request.rotor.name,
         "inflow": request.inflow,
@@ -183,6 +201,8 @@ def numbers(result: Result) -> dict[str, Any]:
         "CT": flown.CT,
         "CT_over_solidity": flown.CT / float(solidity(request.rotor)),
         "CP": flown.CQ,
+        "thrust_newton": flown.CT * force,
+        "power_watt": flown.CQ * force * tip,
         "CP_induced": flown.CP_induced,
         "CP_profile": flown.CP_profile,
         "CP_parasite": flown.CP_parasite,
@@ -204,12 +224,13 @@ def table(found: dict[str, Any]) -> str:
     """The same for the screen."""
     place = "out of ground effect" if found["height"] is None else f"h = {found['height']:g} R"
     rows = (
-        "{rotor}, {inflow}: C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio {advance_ratio:g}, " + place,
+        "{rotor}, {inflow}: {thrust_newton:.0f} N, C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio "
+        "{advance_ratio:g}, " + place,
         "controls  θ₀ {collective_deg:.3f}°, θ₁c {theta_1c_deg:.3f}°, θ₁s {theta_1s_deg:.3f}°, "
         "shaft {tilt_deg:.3f}° forward",
         "blades    β₀ {beta_0_deg:.3f}°, β₁c {beta_1c_deg:.3f}°, β₁s {beta_1s_deg:.3f}°, lag {lag_0_deg:.3f}°",
-        "power     C_P {CP:.4e}: induced {CP_induced:.4e}, profile {CP_profile:.4e}, parasite {CP_parasite:.4e}, "
-        "lag dampers {CP_damper:.1e}",
+        "power     {power_kw:.1f} kW, C_P {CP:.4e}: induced {CP_induced:.4e}, profile {CP_profile:.4e}, parasite "
+        "{CP_parasite:.4e}, lag dampers {CP_damper:.1e}",
         "in {iterations} steps, {wall_time_s:.1f} s, {verdict_text}",
     )
-    return "\n".join(rows).format(**found)
+    return "\n".join(rows).format(**found, power_kw=found["power_watt"] / 1e3)

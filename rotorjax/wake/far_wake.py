@@ -65,7 +65,8 @@ def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, "
     radius grows so that the flow through it is kept. A jet that meets the plane aslant keeps what moves it along the
     plane: it comes down along the shaft and runs off downhill, and the stagnation point lies uphill. As h → ∞ all this
     becomes the first. A wake cut off without closure expands and bunches at its end and pulls the inflow at the disk
-    with it.
+    with it. Over surfaces the plane is the rotor's floor (`FreeWake.floor`); what of it comes into a closed surface is
+    shut off there.
     """
     turn = model.settings.old_segments_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
@@ -75,11 +76,11 @@ def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, "
         drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
     # all repeats at once, (F, repeats, N, 3)
     after = jnp.asarray(repeats(model).after)[:, None]
-    if model.ground is None:
+    if model.floor is None:
         pitch = jnp.mean(last[..., 2] - before[..., 2], axis=1)
         down = pitch[:, None] * np.array([0.0, 0.0, 1.0]) + drift
         return _in_line(model, last[:, None] + after[..., None] * down[:, None, None])
-    plane = model.ground
+    plane = model.floor
     # heights do not depend on the frame, so only the foot and the normal have to be turned into the blade's
     normal = rotate_about_shaft(plane.normal, -psi)
     # where the shaft meets the plane, which a hub that has turned sees elsewhere than under its height

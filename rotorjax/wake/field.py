@@ -69,7 +69,7 @@ def node_velocities(
     if old is None:
         v = _at_targets(model, segments, targets, angles)
     else:
-        v = old + _at_targets(replace(model, ground=None), segments, targets, angles)
+        v = old + _at_targets(alone(model), segments, targets, angles)
     v = v + jax.vmap(lambda points, angle: undisturbed(model, points, angle))(targets, angles)
     ends = np.cumsum([control.shape[1], state.near.shape[1] * state.near.shape[2]])
     at_control, *rest = jnp.split(v, ends, axis=1)
@@ -88,9 +88,9 @@ def old_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, 
     """
     targets, angles = targets_of(model, state), azimuths(state, psi)
     found = _at_targets(model, wake_segments(model, state, psi, "old"), targets, angles)
-    if model.ground is None:
+    if model.ground is None and model.surfaces is None:
         return found
-    return found + _at_targets(model, wake_segments(model, state, psi, "free"), targets, angles, image=True)
+    return found + _at_targets(model, wake_segments(model, state, psi, "free"), targets, angles, answer=True)
 
 
 def targets_of(model: FreeWake, state: WakeState) -> Float[Array, "K N 3"]:
@@ -105,17 +105,13 @@ def _at_targets(
     targets: Float[Array, "K N 3"],
     angles: Float[Array, " K"],
     *,
-    image: bool = False,
+    answer: bool = False,
 ) -> Float[Array, "K N 3"]:
-    """Velocity at points of the slices' frames, all blades' at one instant in one sum; image: of the images alone."""
+    """Velocity at points of the slices' frames, all blades' at one instant in one sum; answer: of ground and surfaces
+    alone.
+    """
     places = to_hub(targets, angles, model.rotor.blades)
-    if image and model.ground is not None:
-        own = replace(model, ground=None)
-        mirrored = at_instants(own, segments, model.ground.reflect_points(places), angles)
-        found = model.ground.reflect_vectors(mirrored)
-    else:
-        found = at_instants(model, segments, places, angles)
-    return from_hub(found, angles, len(targets))
+    return from_hub(at_instants(model, segments, places, angles, answer=answer), angles, len(targets))
 
 
 def velocity(state: WakeState, points: Float[Array, "N 3"], model: FreeWake) -> Float[Array, "K N 3"]:
@@ -139,26 +135,50 @@ def velocity_now(
 
 
 def at_instants(
-    model: FreeWake, segments: Segments, places: Float[Array, "I N 3"], angles: Float[Array, " K"]
+    model: FreeWake,
+    segments: Segments,
+    places: Float[Array, "I N 3"],
+    angles: Float[Array, " K"],
+    *,
+    answer: bool = False,
 ) -> Float[Array, "I N 3"]:
-    """Velocity at points of the hub frame, N for each instant, from all blades' wakes and their images in the ground.
+    """Velocity at points of the hub frame, N for each instant, from all blades' wakes, their images in the ground and
+    the surfaces that they blow on; answer: of images and surfaces alone.
 
-    The ground is fixed in that frame. Slices i, i + I, i + 2I … are the blades' wakes at instant i. K = 1: every
-    blade's wake is the same, and points are seen from the slice's own blade, as level ground looks from all of them.
+    Ground and surfaces are fixed in that frame. Slices i, i + I, i + 2I … are the blades' wakes at instant i. K = 1:
+    every blade's wake is the same, and points are seen from the slice's own blade, as level ground looks from all of
+    them.
     """
     turned = segments._replace(start=_turned(segments.start, angles), end=_turned(segments.end, angles))
     blades = model.rotor.blades if len(angles) == 1 else 1
     of_instants = jax.tree.map(lambda a: _together(a, model.rotor.blades), turned)
 
+    def induced(points, sources, plane):
+        products = model.settings.pair_sums == "products"
+        return segment_velocity(points, *sources, plane=plane, blades=blades, products=products)
+
     def one(operand):
         points, sources = operand
-        return segment_velocity(
-            points, *sources, plane=model.ground, blades=blades, products=model.settings.pair_sums == "products"
-        )
+        if not answer:
+            found = induced(points, sources, model.ground)
+        elif model.ground is None:
+            found = jnp.zeros_like(points)
+        else:
+            found = model.ground.reflect_vectors(induced(model.ground.reflect_points(points), sources, None))
+        if model.surfaces is None:
+            return found
+        panels = model.surfaces.panels
+        through = jnp.sum(induced(panels.middles, sources, model.ground) * panels.normals, axis=1)
+        return found + model.surfaces.answer(points, through, model.ground)
 
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
     return jax.lax.map(one, (places, of_instants))
+
+
+def alone(model: FreeWake) -> FreeWake:
+    """The model without ground and surfaces."""
+    return replace(model, ground=None, surfaces=None)
 
 
 def to_hub(points: Float[Array, "K n 3"], angles: Float[Array, " K"], blades: int) -> Float[Array, "I m 3"]:

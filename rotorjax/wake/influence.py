@@ -16,6 +16,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex, Float
 
+from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake import kernel_sweeps
 from rotorjax.wake.field import self_induction
@@ -72,6 +73,7 @@ def velocity_response(model: FreeWake, state: WakeState, phase: Float[Array, ""]
     leads that of the one before. n runs over the slice's state as `ravel_pytree` lays it out, N over control points,
     near and far nodes.
     """
+    _require_open_air(model)
     own = jax.tree.map(lambda a: a[0], state)
     flat, unravel = ravel_pytree(own)
     places = along_blade(model.stations)
@@ -106,6 +108,7 @@ def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -
     state: K = B slices, blade 0 at psi. n runs over a slice's state as `ravel_pytree` lays it out, N over control
     points, near and far nodes; hub and blades stand still.
     """
+    _require_open_air(model)
     angles, numbers = azimuths(state, psi), jnp.arange(slices(state))
     unravel = ravel_pytree(jax.tree.map(lambda a: a[0], state))[1]
     flat = jax.vmap(lambda s: ravel_pytree(s)[0])(state)
@@ -136,6 +139,14 @@ def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -
         return own.at[len(own) - len(bend) :, :, k].add(bend)
 
     return jax.lax.map(at_blade, (numbers, angles))
+
+
+def _require_open_air(model: FreeWake) -> None:
+    if model.surfaces is not None:
+        raise InputError(
+            "Argument `model` must have no surfaces to have dense derivatives, which know planes only, but has some: "
+            "linearise over the ground alone, or take products with `ode.linear`"
+        )
 
 
 def _seen(model: FreeWake, points: Float[Array, "N 3"]) -> list[tuple[Array, Array]]:

@@ -21,10 +21,15 @@ from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.surface import Panels, Solid, floor, solid
 from rotorjax.rotor import geometry
 from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, hover_settings
+
+AMONG = {"tip_core": 0.05}
+"""Settings of a wake among surfaces beyond those of hover: where turns are not round, thin old vortices wind round each
+other and the search stalls, as in flight."""
 
 
 class WakeState(eqx.Module):
@@ -81,7 +86,8 @@ class FreeWake(eqx.Module):
     """Parameters of the free wake: rotor, operating point, ground and settings, all leaves differentiable.
 
     washout: velocity (over ΩR) of an auxiliary flow that carries the wake away, 0 in every physical case; the solver
-    starts with it and takes it back (solution.py). flight: None for rigid blades in hover or climb.
+    starts with it and takes it back (solution.py). flight: None for rigid blades in hover or climb. surfaces: what else
+    no air goes through, fixed in the hub frame as the ground is; the wake is then one of K slices.
     """
 
     rotor: Rotor
@@ -90,6 +96,7 @@ class FreeWake(eqx.Module):
     settings: WakeSettings
     washout: Float[Array, ""]
     flight: Flight | None = None
+    surfaces: Solid | None = None
 
     def of_slice(self, k: int | Int[Array, ""]) -> "FreeWake":
         """The model of one slice: its blade's motion alone."""
@@ -142,26 +149,55 @@ class FreeWake(eqx.Module):
         return 1.0 if self.flight is None or self.flight.speed is None else self.flight.speed
 
     @property
+    def floor(self) -> Plane | None:
+        """The plane that stands for all that lies under the rotor, where only a plane will do: the turns beyond the
+        free ones, and a search's start. Without surfaces the ground itself.
+        """
+        return self.ground if self.surfaces is None else floor(self.surfaces.panels, self.ground)
+
+    @property
+    def levelled(self) -> "FreeWake":
+        """The axisymmetric model nearest to this one: over its floor, level, or over none."""
+        plane = self.floor
+        if plane is not None:
+            plane = Plane(plane.height, jnp.zeros_like(plane.slope))
+        return replace(self, ground=plane, surfaces=None)
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether every blade's wake is the same: over level ground or none, not asked how it tilts."""
+        level = self.ground is None or (known(self.ground.slope) and float(self.ground.slope) == 0)
+        return level and self.surfaces is None
+
+    @property
     def viscosity(self) -> Float[Array, ""]:
         """Kinematic viscosity over ΩR²."""
         return self.operating.viscosity / (self.operating.omega * self.rotor.radius**2)
 
 
 def free_wake(
-    rotor: Rotor, operating: OperatingPoint, ground: Plane | None = None, settings: WakeSettings | None = None
+    rotor: Rotor,
+    operating: OperatingPoint,
+    ground: Plane | None = None,
+    settings: WakeSettings | None = None,
+    surfaces: Panels | None = None,
 ) -> FreeWake:
-    """Make the model of a rotor's free wake, in or out of ground effect.
+    """Make the model of a rotor's free wake, in or out of ground effect, beside and above solid surfaces.
 
-    settings: `hover_settings()` where none are given. Everything but shapes may be traced.
+    settings: `hover_settings()` where none are given, among surfaces with cores of 0.05 R. surfaces: of `box`, `slab`,
+    `wall`, `terrain` or `read_stl`, added up; what of them rests on the ground is left out. Everything but shapes may
+    be traced.
 
-    Raises InputError where the rotor climbs over ground, its solidity or tip Mach number is beyond sense, or azimuths
-    is no multiple of the number of blades.
+    Raises InputError where the rotor climbs over ground or surfaces, its solidity or tip Mach number is beyond sense,
+    azimuths is no multiple of the number of blades, or surfaces cannot be closed (`panels.surface.solid`).
     """
-    settings = (hover_settings() if settings is None else settings).for_blades(rotor.blades)
+    if settings is None:
+        settings = hover_settings() if surfaces is None else hover_settings(**AMONG)
+    settings = settings.for_blades(rotor.blades)
     check_rotor(rotor, operating)
-    if ground is not None and known(operating.climb) and float(operating.climb) != 0:
+    if (ground is not None or surfaces is not None) and known(operating.climb) and float(operating.climb) != 0:
         raise InputError(
-            f"Argument `operating` must not climb over ground (a steady state needs a fixed height), "
+            f"Argument `operating` must not climb over ground or surfaces (a steady state needs a fixed height), "
             f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
         )
     if settings.azimuths % rotor.blades:
@@ -169,7 +205,8 @@ def free_wake(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
             f"but has {settings.azimuths}"
         )
-    return FreeWake(rotor, operating, ground, settings, array(0.0))
+    closed = None if surfaces is None else solid(surfaces, ground)
+    return FreeWake(rotor, operating, ground, settings, array(0.0), surfaces=closed)
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:

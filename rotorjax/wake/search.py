@@ -15,6 +15,7 @@ from rotorjax.ode.anderson import anderson
 from rotorjax.ode.continuation import Branch, continuation
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
+from rotorjax.panels.surface import refitted
 from rotorjax.wake.equilibrium import METHOD, Unknowns, look, told
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
@@ -43,6 +44,12 @@ DISTANT = 2.0
 
 WASHOUT = 0.08
 """Auxiliary flow at the start (over ΩR): strong enough for Anderson's iteration to converge outright."""
+
+
+def share(model: FreeWake):
+    """Where a model keeps the share of its surfaces' flow that counts."""
+    assert model.surfaces is not None
+    return model.surfaces.share
 
 
 @dataclass
@@ -84,6 +91,8 @@ class Search:
 
         def between(s):
             model = on_host(jax.tree.map(lambda a, b: a + s * (b - a) if eqx.is_inexact_array(a) else b, here, there))
+            if model.surfaces is not None and s < 1:
+                model = on_host(replace(model, surfaces=refitted(model.surfaces, model.ground)))
             if here.ground is None or there.ground is None:
                 return model
             # even steps in 1/h: the ground's effect goes with it
@@ -93,6 +102,19 @@ class Search:
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
         first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
         return self.follow(between, x, stage, first, min(last, SMALLEST), first)
+
+    def among(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
+        """From the wake of `model.levelled`, over K slices, to the surfaces: at once, or as their flow comes up.
+
+        Over a large deck that wake is nearly the one; beside a wall it is the one that the wall's flow is added to.
+        """
+        self.prepare(model, x)
+        found = self.newton(model, x, self.tol)
+        self.note("surfaces", found)
+        self.ok, self.why = found.converged, found.why
+        if found.converged or found.interrupted:
+            return on_host(model), found.x
+        return self.follow(lambda s: on_host(eqx.tree_at(share, model, np.asarray(s))), x, "share of surfaces", 0.5)
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
@@ -120,7 +142,7 @@ class Search:
             return found
 
         def carry(x, here, there):
-            return with_the_ground(x, at(here).ground, at(there).ground)
+            return with_the_ground(x, at(here).floor, at(there).floor)
 
         self.prepare(at(0.0), x)
         branch: Branch = continuation(
@@ -148,10 +170,9 @@ class Search:
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
-        if x.near.shape[0] > 1 and model.ground is not None:
-            level = eqx.tree_at(lambda m: m.ground.slope, model, np.zeros_like(model.ground.slope))
-            laid = laid_level(x, model.ground)
-            self.inverse = harmonic_inverse(level, laid, x.near.shape[0], look(level, laid)[1])
+        if x.near.shape[0] > 1:
+            about, laid = on_host(model.levelled), laid_level(x, model.floor)
+            self.inverse = harmonic_inverse(about, laid, x.near.shape[0], look(about, laid)[1])
 
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""
@@ -159,13 +180,6 @@ class Search:
         self.residuals.extend(found.residuals)
         if self.progress is not None:
             self.progress(stage, found.residual)
-
-
-def level(model: FreeWake) -> FreeWake:
-    """The model over level ground at its height, or none."""
-    if model.ground is None:
-        return on_host(model)
-    return on_host(eqx.tree_at(lambda m: m.ground.slope, model, np.zeros_like(model.ground.slope)))
 
 
 def with_washout(model: FreeWake, washout: float) -> FreeWake:

@@ -37,7 +37,7 @@ def solve(
     if known(model):
         return on_host.solve(model, start, progress, tol)
     fixed = jax.lax.stop_gradient(model)
-    slices = 1 if _stays_level(model) else model.settings.azimuths
+    slices = 1 if model.axisymmetric else model.settings.azimuths
     if known(fixed):
         x = jax.tree.map(jnp.asarray, _found(fixed, start, progress, tol, slices))
     else:
@@ -82,14 +82,7 @@ def _axisymmetric(x: Unknowns, model: FreeWake) -> Float[Array, "n n"]:
 
 def _over_a_slope(x: Unknowns, model: FreeWake) -> HarmonicInverse:
     """Inverse Jacobian of a wake over level ground like this one: with it GMRES needs a few tens of products."""
-    assert model.ground is not None
-    level = eqx.tree_at(lambda m: m.ground.slope, model, jnp.zeros_like(model.ground.slope))
-    return harmonic_inverse(level, laid_level(x, model.ground), x.near.shape[0])
-
-
-def _stays_level(model: FreeWake) -> bool:
-    """Whether the ground is level, or none, and is not asked how it tilts."""
-    return model.ground is None or (known(model.ground.slope) and float(model.ground.slope) == 0)
+    return harmonic_inverse(model.levelled, laid_level(x, model.floor), x.near.shape[0])
 
 
 def _found(model: FreeWake, start: Solution | None, progress: Progress | None, tol: float, slices: int) -> Unknowns:

@@ -21,7 +21,7 @@ from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evalua
 from rotorjax.wake.field import velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
-from rotorjax.wake.search import Progress, Search, level
+from rotorjax.wake.search import Progress, Search, on_host
 from rotorjax.wake.start import prescribed
 
 Number = Numbers = Any  # of numpy, or traced by jax
@@ -105,23 +105,27 @@ def solve(
     clock = Clock()
     search = Search(tol, progress)
     if start is None or not start.converged or not _fits(start, model):
-        here, x = search.from_nothing(level(model))
+        here, x = search.from_nothing(on_host(model.levelled))
     else:
         # the static choices are the model's own (azimuths may differ), the numbers the start's
         numbers = jax.tree.leaves(start.model.settings)
         settings = jax.tree.unflatten(jax.tree.structure(model.settings), numbers)
         here, x = eqx.tree_at(lambda m: m.settings, start.model, settings), start.unknowns
     if search.ok:
-        slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
+        slices = 1 if model.axisymmetric else model.settings.azimuths
         if x.near.shape[0] > slices:
             x = jax.tree.map(lambda a: np.mean(a, axis=0, keepdims=True), x)
-        here, x = search.move(here, model, _spread(x, slices), "to the case")
+        x = _spread(x, slices)
+        if here.surfaces is None and model.surfaces is not None:
+            here, x = search.among(model, x)
+        else:
+            here, x = search.move(here, model, x, "to the case")
     return read(here, x, search, clock)
 
 
 def rehearse(model: FreeWake) -> Solution:
     """Compile what `solve` runs on a case of this kind, on a prescribed wake that solves nothing and is returned."""
-    slices = 1 if model.ground is None or float(model.ground.slope) == 0 else model.settings.azimuths
+    slices = 1 if model.axisymmetric else model.settings.azimuths
     x = _spread(prescribed(model), slices)
     search = Search(tol=0.0, progress=None, ok=False, why="a rehearsal")
     search.prepare(model, x)
@@ -130,11 +134,13 @@ def rehearse(model: FreeWake) -> Solution:
 
 
 def _fits(start: Solution, model: FreeWake) -> bool:
-    """Whether a solution has the blades, nodes and ground of a model."""
+    """Whether a solution has the blades, nodes, ground and panels of a model."""
     a, b = start.model, model
     nodes = ("panels", "age_step_deg", "near_ages", "far_ages", "stretch", "filaments", "roll_up")
     same = all(getattr(a.settings, n) == getattr(b.settings, n) for n in nodes)
     same = same and (a.ground is None) == (b.ground is None)
+    panels = [0 if one.surfaces is None else len(one.surfaces.panels) for one in (a, b)]
+    same = same and panels[0] == panels[1]
     return same and jax.tree.structure(a.rotor) == jax.tree.structure(b.rotor)
 
 

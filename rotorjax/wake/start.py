@@ -1,6 +1,7 @@
 """Guesses of the wake: a prescribed one (after Landgrebe 1972), and a solved one moved to another ground."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -79,11 +80,13 @@ def _with_the_ground(x: Unknowns, before: Plane, after: Plane) -> Unknowns:
 
 
 @eqx.filter_jit
-def laid_level(x: Unknowns, ground: Plane) -> Unknowns:
+def laid_level(x: Unknowns, ground: Plane | None) -> Unknowns:
     """Axisymmetric wake (K = 1) like that of a slope: its nodes sheared down or up to level ground, then averaged.
 
     All above the ground, and more so than by with_the_ground: a mean of nodes under it would be no wake.
     """
+    if ground is None:
+        return jax.tree.map(lambda a: jnp.mean(a, axis=0, keepdims=True), x)
     at = 2 * jnp.pi / x.near.shape[0] * jnp.arange(x.near.shape[0])[:, None, None]
 
     def move(nodes):

@@ -38,8 +38,9 @@ def case(tmp_path, variant="quasi-steady", duration=0.5, edge="", rotor="caradon
 def test_landing_writes_everything(tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["deck", "--case", str(case(tmp_path)), "--out", str(out), "--gif"]) == 0
-    names = {"history.nc", "report.json", "histories.png", "histories.pdf", "disk.png", "disk.pdf", "animation.gif"}
-    assert {p.name for p in out.iterdir()} == names
+    pictures = {"histories.png", "histories.pdf", "disk.png", "disk.pdf", "animation.gif"}
+    assert {p.name for p in out.iterdir()} == {"history.nc", "report.json", "report.html"} | pictures
+    assert (out / "report.html").read_text().count("data:image/") == 3
     report = json.loads((out / "report.json").read_text())
     data = netcdf.read(out / "history.nc")
     assert report["histories"]["uniform"]["last"] == pytest.approx(float(data["uniform"][-1]))

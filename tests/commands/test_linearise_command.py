@@ -99,7 +99,7 @@ BAD = {
     "--height 1 2": "`height` must be one",
     "--thrust-coefficient 0.005": "`quick` must be left out",
     "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1 --inputs slope": "has 'slope'",
-    "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1 0": "`advance_ratio` not 0",
+    "--thrust-coefficient 0.005 --inflow freewake --advance-ratio 0.1 0 --tilt 2": "`tilt` must be 0 in hover",
     "--thrust-coefficient 0.005 --inflow freewake --azimuths 24": "`azimuths` must be left out",
 }
 

@@ -1,6 +1,8 @@
 """`rotorjax new` and `doctor`: what is written runs unchanged, and nothing is replaced."""
 
 import json
+import subprocess
+import tomllib
 
 import pytest
 
@@ -62,6 +64,34 @@ def test_nothing_is_replaced(tmp_path, capsys):
     assert main(["new", "deck", str(tmp_path)]) == 2
     assert "case.toml: is there already and is not replaced" in capsys.readouterr().err
     assert (tmp_path / "case.toml").read_text() == "mine"
+
+
+def test_without_a_folder_it_is_printed(capsys):
+    assert main(["new", "deck"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["rotor"]["name"] == "uh60"
+    assert main(["new", "rotor"]) == 2
+    assert "refers to naca0012_sandia.csv" in capsys.readouterr().err
+
+
+def test_bash_completes_commands_options_and_files(tmp_path, capsys):
+    assert main(["completion", "bash"]) == 0
+    script = tmp_path / "rotorjax.bash"
+    script.write_text(capsys.readouterr().out)
+    (tmp_path / "case.toml").touch()
+
+    def completed(*words):
+        ask = (
+            f"source {script}; COMP_WORDS=({' '.join(words)}); COMP_CWORD={len(words) - 1}; "
+            '_shtab_rotorjax; echo "${COMPREPLY[@]}"'
+        )
+        return subprocess.run(
+            ["bash", "-c", ask], capture_output=True, text=True, check=True, cwd=tmp_path
+        ).stdout.split()
+
+    assert completed("rotorjax", "li") == ["linearise"]
+    assert completed("rotorjax", "trim", "--thrust") == ["--thrust-coefficient"]
+    assert completed("rotorjax", "new", "si") == ["simulate"]
+    assert "case.toml" in completed("rotorjax", "deck", "--case", "ca")
 
 
 def test_doctor_tells_what_a_report_needs(capsys):

@@ -31,7 +31,7 @@ def read(text, tmp_path):
 
 def test_motion_and_its_rates(tmp_path):
     case = read(CASE, tmp_path)
-    np.testing.assert_allclose([case.collective, case.edge_azimuth], np.deg2rad([16.0, 90.0]))
+    np.testing.assert_allclose([*case.collective, case.edge_azimuth], np.deg2rad([*[16.0] * case.t.size, 90.0]))
     psi = np.linspace(0, 9.9 * case.omega, 4001)
     motion = case.motion(psi)
     jumps = np.abs(motion["climb_rate"] - np.gradient(motion["climb"], psi)) > 5e-6
@@ -43,6 +43,13 @@ def test_motion_and_its_rates(tmp_path):
     assert np.all(motion["climb"] <= 1e-15)
     np.testing.assert_allclose(np.ptp(motion["slope"]), 2 * np.deg2rad(3), rtol=1e-4)
     np.testing.assert_allclose(case.instants()[-1], 10.0 * case.omega)
+
+
+def test_the_pilots_collective(tmp_path):
+    own = CASE.replace("collective_deg = 16.0\n", "").replace("[deck]", "collective_deg = [16.0, 15.0, 15.5]\n[deck]")
+    case = read(own, tmp_path)
+    found = case.motion(np.array([0.0, 4.0, 10.0]) * case.omega)["collective"]
+    np.testing.assert_allclose(np.rad2deg(found), [16.0, 15.0, 15.5])
 
 
 def test_blades_flap_where_they_have_hinge_data(tmp_path):
@@ -88,6 +95,19 @@ def test_bad_input(new, tmp_path):
     with pytest.raises(InputError, match=match) as error:
         read(CASE.replace(old, new), tmp_path)
     assert "case.toml" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "match"),
+    [
+        ("[16.0, 15.0, 15.0]", r"\[rotor\] collective_deg must be absent"),
+        ("[16.0, 15.0]", r"collective_deg must hold 3 values"),
+    ],
+)
+def test_bad_collectives(values, match, tmp_path):
+    text = CASE if "absent" in match else CASE.replace("collective_deg = 16.0\n", "")
+    with pytest.raises(InputError, match=match):
+        read(text.replace("[deck]", f"collective_deg = {values}\n[deck]"), tmp_path)
 
 
 def test_missing_file(tmp_path):

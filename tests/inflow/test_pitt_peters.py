@@ -14,6 +14,7 @@ from rotorjax.inflow.pitt_peters import GRADIENT_MASS, disk_moments, pitt_peters
 from rotorjax.ode.trajectory import integrate
 from rotorjax.potential.matrices import influence
 from rotorjax.potential.modes import rotor_modes
+from rotorjax.reference.published import cheeseman_bennett
 from rotorjax.rotor.hub import rotor_inputs
 
 
@@ -123,12 +124,21 @@ def test_moments_of_blades_are_those_of_their_loads():
     np.testing.assert_allclose(found, [0.006, 0.5 * 2 * 0.001, -0.5 * 2 * 0.002], rtol=1e-12)
 
 
-def test_ground_takes_away_cheeseman_and_bennetts_share():
-    hover = ground_share(jnp.asarray(0.05), rotor_inputs(height=1.0))
-    np.testing.assert_allclose(hover, 1 - 1 / 16)
-    fast = ground_share(jnp.asarray(0.02), rotor_inputs(height=1.0, u=0.2))
-    np.testing.assert_allclose(fast, 1 - 1 / 16 / (1 + 100))
-    assert ground_share(jnp.asarray(0.05), rotor_inputs()) == 1
+@pytest.mark.parametrize(("u", "rtol"), [(0.0, 1e-12), (0.1, 1e-4), (0.2, 1e-5)])
+def test_ground_gives_cheeseman_and_bennetts_thrust_at_the_same_power(u, rtol):
+    """T∞/T = 1 − (1/16h²)/(1 + (μ/λ)²): exact in hover, where power goes as T^1.5, and next to it in flight."""
+    there, free = rotor_inputs(height=1.0, u=u), rotor_inputs(u=u)
+    mean = hover_inflow(jnp.asarray(0.006), free)
+    thrust = 0.006 / (1 - 1 / 16 / (1 + (u / mean) ** 2))
+    over = hover_inflow(thrust, free)
+    np.testing.assert_allclose(thrust * ground_share(over, there) * over, 0.006 * mean, rtol=rtol)
+    assert ground_share(mean, free) == 1
+
+
+def test_momentum_theory_over_ground_is_the_published_formula():
+    for height in (0.5, 0.75, 1.0, 2.0):
+        share = ground_share(jnp.asarray(0.05), rotor_inputs(height=height))
+        np.testing.assert_allclose(share, cheeseman_bennett(height), rtol=1e-12)
 
 
 def test_derivatives_of_the_rate():

@@ -15,8 +15,9 @@ from rotorjax.coupled import RotorState
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import flight, wake_flight
-from rotorjax.linearisation.condensed import condensed
+from rotorjax.linearisation.condensed import Condensed, aligned, condensed, shares_of
 from rotorjax.linearisation.drive import drive_of
+from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.hover import Flat, products
 from rotorjax.linearisation.instant import instant
 from rotorjax.linearisation.rotor import Base, SteadyState
@@ -120,16 +121,27 @@ def test_a_condensed_model_keeps_the_blades_and_the_steps(model):
     truth = model.step(4)
     errors = []
     for states in (20, 60):
-        small = condensed(model, 4, np.abs(truth).max(axis=0), states)
+        small, basis = condensed(model, 4, np.abs(truth).max(axis=0), states)
         assert small.order == 16 + states
         assert small.states[:2] == ("beta_0", "beta_1c")
         own = np.stack([small.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
         errors.append(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0))
     assert np.median(errors[1]) < min(0.015, 0.5 * np.median(errors[0]))
+    one = Condensed(small, basis)
+    other = condensed(model, 4, np.abs(truth).max(axis=0) ** 0.5, states, shares_of(small.states))
+    turned = aligned([one, other])
+    assert other.model.states == small.states
+    assert np.linalg.norm(one.model.b - other.model.b) > 0.1 * np.linalg.norm(small.b)  # other directions
+    for own, before in zip(turned, (one.model, other.model), strict=True):
+        np.testing.assert_allclose(own.step(np.ones(len(INPUTS)))[1], before.step(np.ones(len(INPUTS)))[1], rtol=1e-6)
+    # the same model in both coordinates: what is between is it, too
+    middle = replace(turned[0], **{name: (getattr(turned[0], name) + getattr(turned[1], name)) / 2 for name in "abc"})
+    own = np.stack([middle.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
+    assert np.median(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0)) < 0.03
 
 
 BAD = {
-    "`advance_ratio` not 0": ({}, {}),
+    "`slope` must be 0 .* 3: a level flight": ({"advance": 0.15, "height": 1.0, "slope_deg": 3.0}, {}),
     "has 'gust_aft'": ({"advance": 0.15}, {"inputs": ("gust_aft",)}),
     "has 'clearance_aft'": ({"advance": 0.15}, {"outputs": ("clearance_aft",)}),
     "`order` must be at least 13": ({"advance": 0.15}, {"order": 12}),
@@ -141,7 +153,7 @@ BAD = {
 def test_bad_input_is_refused_before_the_trim(message):
     asked, wanted = BAD[message]
     with pytest.raises(InputError, match=message):
-        flight.check(request("uh60", 0.00575, "freewake", **asked), flight.Wanted(**wanted))
+        flight.check(request("uh60", 0.00575, "freewake", **asked), Wanted(**wanted))
 
 
 def test_a_failed_trim_is_refused_and_a_lost_march_told(base):

@@ -1,7 +1,9 @@
 """The rotor in its free wake in hover by wave number: against forward mode of all blades, and its small model."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,20 +11,22 @@ import pytest
 from jax.flatten_util import ravel_pytree
 from wakes import COARSE
 
+import rotorjax as rj
 from rotorjax.coupled import RotorState
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
-from rotorjax.linearisation import hover_flight
+from rotorjax.linearisation import flight, hover_flight, rotor, trim_output
 from rotorjax.linearisation.drive import drive_of
-from rotorjax.linearisation.flight import Wanted
+from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.hover import CHUNK, Flat, hover_model, members_of, pushed
 from rotorjax.linearisation.hover_small import small_hover
-from rotorjax.linearisation.rotor import Base, SteadyState
+from rotorjax.linearisation.rotor import Base, SteadyState, rate_and_readings, state_names
+from rotorjax.linearisation.stages import Stages
 from rotorjax.ode.orbit import make_orbit
 from rotorjax.ode.outcome import Outcome
 from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.simulation.march import marching
-from rotorjax.trim.run import request
+from rotorjax.trim.run import Result, request
 from rotorjax.wake.equilibrium import full_state, spread
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
@@ -50,6 +54,19 @@ def base(uh60):
 @pytest.fixture(scope="module")
 def model(base):
     return hover_model(base, INPUTS, OUTPUTS)
+
+
+def test_rates_of_a_wake_alike_on_all_blades_are_so_from_every_azimuth(base):
+    """In multi-blade coordinates the rates of a level hover do not depend on the azimuth, and have no cyclic part."""
+    program, x = eqx.filter_jit(rate_and_readings), base.orbit.start
+    (one, read), (other, again) = (program(jnp.asarray(psi), x, base.u, base.p) for psi in (0.0, 0.7))
+    flat, turned = (np.asarray(ravel_pytree(rate)[0]) for rate in (one, other))
+    np.testing.assert_allclose(flat, turned, atol=1e-12 * np.abs(flat).max())
+    names = state_names(x, base.p)[0]
+    uneven = [k for k, name in enumerate(names) if any(part in name for part in ("_1c", "_1s", "_D"))]
+    assert len(names) == flat.size == len(set(names))
+    assert np.abs(flat[uneven]).max() < 1e-12
+    assert float(read["CT"]) == pytest.approx(float(again["CT"]), rel=1e-12)
 
 
 @pytest.mark.slow
@@ -107,27 +124,59 @@ def test_modes_of_blades_and_wake_have_names(model):
     assert np.abs(model.waves[0].resolvent.poles - value).min() < 1e-9
 
 
+@pytest.fixture
+def hovered(base, monkeypatch):
+    """A trim that is the base."""
+    monkeypatch.setattr(rotor, "base_of", lambda trimmed, *_: base)
+    flown = SimpleNamespace(CT=0.00575, controls=np.zeros(4))
+    return Result(request("uh60", 0.00575, "freewake"), None, flown, None, 0.0)
+
+
+def test_the_front_door_takes_a_hover(hovered, model):
+    full = rj.linearise(hovered, INPUTS, OUTPUTS)
+    np.testing.assert_array_equal(full.a, model.linear().a)
+    assert full.notes["CT"] == 0.00575
+    small = rj.linearise(hovered, INPUTS, OUTPUTS, order=20, time="seconds")
+    assert (small.order, small.time) == (20, "seconds")
+    with pytest.raises(InputError, match="`harmonics` must be"):
+        rj.linearise(hovered, harmonics=None)
+
+
+def test_it_is_written_like_any_linear_rotor(hovered, tmp_path, monkeypatch):
+    monkeypatch.setattr(trim_output, "numbers", lambda result: {})
+    found = hover_flight.hovering(hovered, Wanted(INPUTS, OUTPUTS), Stages(None))
+    content = trim_output.write(found, tmp_path)
+    files = {f"{name}.{end}" for name in ("reduced", "full") for end in ("mat", "nc")}
+    files |= {f"{name}.{end}" for name in ("roots", "steps") for end in ("png", "pdf")}
+    assert {path.name for path in tmp_path.iterdir()} == files | {"README.md", "report.md", "linearise.json"}
+    assert content["reduced_order"] == found.small.model.order == 20
+    assert content["inputs"]["w"]["unit"] == "ΩR"
+    assert content["reduced_step_error"]["CT"]["theta_0"] == found.small.step_error[0, 0]
+    assert "UH-60" in trim_output.lines(found)
+    assert "## Growing modes" in (tmp_path / "report.md").read_text()
+
+
 BAD = {
-    "`advance_ratio` must be 0 for a time-invariant model in the free wake": {"advance": 0.1},
-    "`slope` must be 0": {"height": 1.0, "slope_deg": 3.0},
+    "`tilt` must be 0 in hover": {"tilt_deg": 3.0},
+    "`slope` must be 0 .* take inflow 'vpbfsm'": {"height": 1.0, "slope_deg": 3.0},
 }
 
 
 @pytest.mark.parametrize("message", BAD)
 def test_what_is_no_level_hover_is_refused(message):
     with pytest.raises(InputError, match=message):
-        hover_flight.check(request("uh60", 0.00575, "freewake", **BAD[message]), Wanted())
+        flight.check(request("uh60", 0.00575, "freewake", **BAD[message]), Wanted())
 
 
 def test_two_blades_unknown_names_and_failed_trims_are_refused(base):
     hovering = request("uh60", 0.00575, "freewake")
     two = replace(hovering, rotor=replace(hovering.rotor, blades=2, name="two blades"))
     with pytest.raises(InputError, match="at least three blades"):
-        hover_flight.check(two, Wanted())
+        flight.check(two, Wanted())
     with pytest.raises(InputError, match="has 'gust_aft'"):
-        hover_flight.check(hovering, Wanted(inputs=("gust_aft",)))
+        flight.check(hovering, Wanted(inputs=("gust_aft",)))
     with pytest.raises(InputError, match="harmonics"):
-        hover_flight.check(hovering, Wanted(harmonics=4))
+        flight.check(hovering, Wanted(harmonics=4))
     failed = base._replace(orbit=replace(base.orbit, converged=False))
     with pytest.raises(InputError, match="converged"):
         hover_model(failed, INPUTS, OUTPUTS)

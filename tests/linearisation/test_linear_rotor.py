@@ -7,27 +7,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.flatten_util import ravel_pytree
-from wakes import COARSE
 
-from rotorjax.coupled import RotorState
-from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import flight, identified, steps
 from rotorjax.linearisation.compact import compact, frequencies, reduced
-from rotorjax.linearisation.drive import drive_of
+from rotorjax.linearisation.found import OUTPUTS, Wanted
 from rotorjax.linearisation.modes import modes
-from rotorjax.linearisation.rotor import SteadyState, base_of, linear_rotor, rate_and_readings, state_names
+from rotorjax.linearisation.rotor import base_of, linear_rotor
 from rotorjax.ode.harmonic import average, harmonic_model
 from rotorjax.ode.hill import harmonic_transfer
 from rotorjax.rotor.flap_lag import flap_frequency, lag_frequency
-from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.trim.run import request, run
 from rotorjax.trim.solve import trim
-from rotorjax.wake.equilibrium import full_state, spread
-from rotorjax.wake.model import free_wake
-from rotorjax.wake.settings import wake_settings
-from rotorjax.wake.start import prescribed
 
 INPUTS = ("theta_0", "theta_1c", "theta_1s", "w", "q")
 
@@ -170,7 +161,7 @@ def test_torque_is_linear_too_where_the_lag_damper_is(fast):
 
 
 def test_small_models_keep_the_blades_and_the_responses(in_flight):
-    model = chosen(in_flight, INPUTS, flight.OUTPUTS)
+    model = chosen(in_flight, INPUTS, OUTPUTS)
     truth = harmonic_transfer(model, frequencies())[:, 0]
     found = compact(harmonic_model(model, (0,)), 19, truth)
     pairs = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"))
@@ -183,25 +174,6 @@ def test_small_models_keep_the_blades_and_the_responses(in_flight):
     assert small.states[:3] == ("beta_0", "beta_1c", "beta_1s")
     assert small.states[12:15] == ("lambda_0", "lambda_1c", "lambda_1s")
     np.testing.assert_allclose(small.response(np.zeros(1)), whole.response(np.zeros(1)), rtol=1e-6, atol=1e-9)
-
-
-def test_a_wake_that_is_alike_on_all_blades_stays_so_at_every_azimuth(uh60):
-    """In multi-blade coordinates the rates of a level hover do not depend on the azimuth, and have no cyclic part."""
-    settings = wake_settings(**COARSE)
-    own = full_state(free_wake(*uh60, None, settings), spread(prescribed(free_wake(*uh60, None, settings), 0.05), 1))[0]
-    p, still = coupled_wake(*uh60, settings), jnp.zeros(4)
-    wake = jax.tree.map(lambda v: jnp.concatenate([v, jnp.zeros((3, *v.shape[1:]))]), own)
-    x = SteadyState(RotorState(still.at[0].set(0.05), still, still.at[0].set(0.03), still), wake)
-    program = eqx.filter_jit(rate_and_readings)
-    u = drive_of(rotor_inputs(theta_0=0.3), p)
-    (one, read), (other, again) = (program(jnp.asarray(psi), x, u, p) for psi in (0.0, 0.7))
-    flat, turned = (np.asarray(ravel_pytree(rate)[0]) for rate in (one, other))
-    np.testing.assert_allclose(flat, turned, atol=1e-12 * np.abs(flat).max())
-    names = state_names(x, p)[0]
-    uneven = [k for k, name in enumerate(names) if any(part in name for part in ("_1c", "_1s", "_D"))]
-    assert len(names) == flat.size == len(set(names))
-    assert np.abs(flat[uneven]).max() < 1e-12
-    assert float(read["CT"]) == pytest.approx(float(again["CT"]), rel=1e-12)
 
 
 def test_a_trim_that_failed_is_refused(hover):
@@ -226,7 +198,7 @@ BAD = {
 @pytest.mark.parametrize("message", BAD)
 def test_bad_input_is_refused_before_the_trim(message):
     with pytest.raises(InputError, match=message):
-        flight.check(request("uh60", 0.00575, "pitt-peters"), flight.Wanted(**BAD[message]))
+        flight.check(request("uh60", 0.00575, "pitt-peters"), Wanted(**BAD[message]))
 
 
 def test_harmonics_of_what_does_not_change_are_refused(periodic):
@@ -234,23 +206,45 @@ def test_harmonics_of_what_does_not_change_are_refused(periodic):
         flight.held_harmonics(periodic, 4)
 
 
-def test_an_inflow_is_identified_from_steps(linear):
+def test_an_inflow_is_identified_from_steps(hover, linear, fast, in_flight):
     """Steps of a rotor whose inflow has known constants give them back, and Pitt and Peters' own are the start."""
-    own = identified.own_constants(linear)
-    true = identified.Constants(1.3 * own.m_0, 0.7 * own.k_0, 0.9 * own.m_1, 1.2 * own.k_1, -0.3 * own.k_1)
-    a, b = identified.changed(linear, own)
-    np.testing.assert_allclose(a, linear.a, atol=1e-9)
-    np.testing.assert_allclose(b, linear.b, atol=1e-9)
-    a, b = identified.changed(linear, true)
-    wake = replace(linear, a=np.asarray(a), b=np.asarray(b))
-    found = identified.identified(wake, linear, 1.0)
-    np.testing.assert_allclose(found.constants, true, rtol=1e-4)
-    assert found.error < 1e-4 < found.pitt_peters_error
-    data = identified.table([found, replace(found, height=np.inf)])
-    assert list(data.height.values) == [1.0, np.inf]
-    np.testing.assert_allclose(data.tau_0[0], true.m_0 / true.k_0, rtol=1e-3)
-    assert len(identified.text(data).splitlines()) == 5
-    between = identified.interpolated(found, replace(found, height=np.inf, constants=own), 2.0)
-    np.testing.assert_allclose(between, [(a + b) / 2 for a, b in zip(found.constants, own, strict=True)])
+    start, flow = identified.own(hover), float(np.mean(hover.z.inflow, axis=0)[0])
+    np.testing.assert_allclose(start.stiffness, np.diag([4 * flow, flow, flow]), atol=1e-9)
+    np.testing.assert_allclose(start.mass, [8 / (3 * np.pi), *2 * [16 / (45 * np.pi)]])
+    found = []
+    for trimmed, rotor, advance in ((hover, linear, 0.0), (fast, average(in_flight), 0.3)):
+        start = identified.own(trimmed)
+        a, b = identified.changed(rotor, start, start)
+        np.testing.assert_allclose(a, rotor.a, atol=1e-9)
+        np.testing.assert_allclose(b, rotor.b, atol=1e-9)
+        sheared = 1.0 if advance else 0.0  # in hover moments have no part in thrust
+        swirl = 0.3 * float(start.stiffness[1, 1]) * np.array([[0, sheared, 0], [0, 0, 1], [sheared, -1, 0]])
+        true = identified.Inflow(start.mass * np.array([1.3, 0.9, 0.8]), start.stiffness * 1.2 + swirl)
+        a, b = identified.changed(rotor, start, true)
+        wake = replace(rotor, a=np.asarray(a), b=np.asarray(b))
+        found.append(identified.identified(wake, rotor, start, advance, 1.0))
+        np.testing.assert_allclose(found[-1].inflow.mass, true.mass, rtol=1e-3)
+        np.testing.assert_allclose(found[-1].inflow.stiffness, true.stiffness, atol=1e-3 * true.stiffness.max())
+        assert found[-1].error < 1e-4 < found[-1].pitt_peters_error
     with pytest.raises(InputError, match="has no lambda_0"):
-        identified.identified(wake, replace(linear, states=tuple(f"x[{k}]" for k in range(linear.order))))
+        identified.identified(wake, replace(linear, states=tuple(f"x[{k}]" for k in range(linear.order))), start)
+
+
+def test_an_identified_table_is_interpolated_in_speed_and_one_over_height():
+    one = identified.Identified(identified.Inflow(np.ones(3), np.eye(3)), 0.1, *2 * [None], 0.0, 1.0)
+    one = replace(one, pitt_peters=one.inflow, pitt_peters_error=0.3)
+    grid = [
+        replace(one, inflow=identified.Inflow(np.full(3, 1 + mu / h), np.eye(3) * (1 + 1 / h)), advance=mu, height=h)
+        for mu in (0.1, 0.2)
+        for h in (1.0, np.inf)
+    ]
+    data = identified.table(grid)
+    assert list(data.height.values) == [1.0, np.inf]
+    assert len(identified.text(data).splitlines()) == 7
+    between = identified.interpolated(data, 0.15, 2.0)
+    np.testing.assert_allclose(between.mass, 1 + 0.15 / 2, rtol=1e-12)
+    np.testing.assert_allclose(between.stiffness, 1.5 * np.eye(3), rtol=1e-12)
+    np.testing.assert_allclose(data.tau_0.sel(advance_ratio=0.1, height=1.0), 1.1 / 2)
+    np.testing.assert_allclose(identified.interpolated(data, 0.2).mass, 1.0)
+    with pytest.raises(InputError, match=r"within the table, but are 0\.3 and 2"):
+        identified.interpolated(data, 0.3, 2.0)

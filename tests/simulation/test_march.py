@@ -82,9 +82,9 @@ def test_single_precision(start, fine):
 
 def test_too_few_steps_are_refused_with_the_number_that_is_enough(start):
     least = least_steps(start)
-    assert least == 24
-    with pytest.raises(InputError, match="`steps_per_turn` must be at least 24 for this wake, but is 20"):
-        march(start, 20)
+    assert least == 12
+    with pytest.raises(InputError, match="`steps_per_turn` must be at least 12 for this wake, but is 10"):
+        march(start, 10)
     with pytest.raises(InputError, match=r"`precision` must be one of \('single', 'double'\), but is 'half'"):
         march(start, precision="half")  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="`old_age` must be one of"):

@@ -93,6 +93,9 @@ def test_the_files(flown):
     assert data["inflow"].dims == ("frame", "ray", "radius")
     for name in ("histories.png", "animation.gif"):
         assert (folder / name).stat().st_size > 10_000
+    page = (folder / "report.html").read_text()
+    assert page.count("data:image/") == 2
+    assert f"C_T goes from {told['histories']['CT']['first']:.5f}" in page
 
 
 def test_histories_are_scipys_monotone_cubics_with_their_rates():

@@ -153,14 +153,18 @@ def test_the_command_says_at_once_what_cannot_be(capsys):
 
 def test_a_curve_over_speed(tmp_path, cruise, told):
     """The power's bucket: less at advance ratio 0.2 than in hover; each point as if trimmed alone."""
-    file, picture = tmp_path / "curve.json", tmp_path / "curve.png"
+    file, picture, page = tmp_path / "curve.json", tmp_path / "curve.png", tmp_path / "curve.html"
     flags = ["--thrust-coefficient", str(THRUST), "--advance-ratio", "0", "0.1", "0.2", "--tilt", "4"]
-    assert main(["trim", *flags, "--json", str(file), "--plot", str(picture)]) == 0
+    assert main(["trim", *flags, "--json", str(file), "--plot", str(picture), "--html", str(page)]) == 0
     points = json.loads(file.read_text())["points"]
     assert [p["advance_ratio"] for p in points] == [0, 0.1, 0.2]
     assert points[2]["CP"] < points[0]["CP"]
     assert points[2]["CP"] == pytest.approx(told["CP"], rel=1e-7)
     assert picture.stat().st_size > 10_000
+    told = page.read_text()
+    assert told.count("data:image/png") == 1
+    assert "3 of 3 points converged" in told
+    assert f"({points[2]['power_watt'] / 1e3:.0f} kW) at advance ratio 0.2" in told
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,10 @@ from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
+from rotorjax.sweep import trims
+from rotorjax.sweep.found import CONVERGED, Found, Start
 from rotorjax.trim.free_wake import hub_moment, residual
-from rotorjax.trim.in_wake import _by_way_of_washout, _Stages, trim_in_wake, wake_trim
+from rotorjax.trim.in_wake import _by_way_of_washout, _Stages, alike, trim_in_wake, wake_trim
 from rotorjax.trim.means import evaluated, means
 from rotorjax.trim.run import check, numbers, request, run, table
 from rotorjax.trim.verdict import verdict
@@ -47,6 +49,21 @@ def test_forward_flight_is_trimmed(told):
     assert abs(told["beta_1c_deg"]) < 1e-5
     assert abs(told["beta_1s_deg"]) < 1e-5
     assert told["theta_1s_deg"] < -1 < 0.5 < told["theta_1c_deg"]
+
+
+@pytest.mark.slow
+def test_a_trim_starts_from_its_neighbour_as_from_nothing(cruise):
+    """From μ = 0.2 to 0.22 and back; what a sweep keeps of a trim is the same trim."""
+    aside = run(replace(cruise.request, advance=0.22), cruise.trimmed)
+    kept = Found({}, CONVERGED, trims._state(aside.trimmed))
+    back = run(cruise.request, trims._restored(Start(aside.request, kept)))
+    assert aside.converged
+    assert back.converged
+    assert aside.trimmed.iterations < 0.5 * cruise.trimmed.iterations
+    assert abs(aside.means.CQ / cruise.means.CQ - 1) > 1e-3
+    np.testing.assert_allclose(back.means.controls, cruise.means.controls, atol=1e-5)
+    np.testing.assert_allclose(back.means.CQ, cruise.means.CQ, rtol=1e-5)
+    assert not alike(wake_trim(*load("uh60"), rotor_inputs(height=1.0), THRUST, plane(1.0)), cruise.trimmed.p)
 
 
 @pytest.mark.slow

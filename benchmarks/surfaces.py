@@ -1,0 +1,293 @@
+"""Solid surfaces under the free wake: `python benchmarks/surfaces.py [--parts …] [--quick] [--json FILE] [--out DIR]`.
+
+Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
+theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
+the edge of a roof a radius below it), hangar (one beside a wall at 1.2 R). Knight and Hefner's two-bladed rotor at 8°
+with a wake that keeps all of it to minutes: three free turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import rotorjax as rj
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, save_file, style
+from rotorjax.frames import rotate_about_shaft
+from rotorjax.panels.kernel import panel_velocity
+from rotorjax.panels.surface import Panels, normal_flow, solid
+from rotorjax.potential.ground_source import DiskQuadrature
+from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
+from rotorjax.region import half_plane
+from rotorjax.wake.equilibrium import evaluate
+from rotorjax.wake.field import at_instants, velocity, wake_segments
+from rotorjax.wake.model import azimuths
+from rotorjax.wake.sensitivity import periodic_wake
+from rotorjax.wake.solution import readings
+
+jax.config.update("jax_enable_x64", True)
+
+SETTINGS = {"panels": 10, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_turns": 3.0, "stretch": 1, "azimuths": 8}
+SETTINGS |= {"tip_core": 0.05}
+COARSE = SETTINGS | {"panels": 8, "free_turns": 2.0, "closure_turns": 1, "closure_bundles": 2}
+PLACES = np.linspace(-1.5, 1.5, 13)
+HEIGHT = 1.0
+
+
+def wake(surfaces=None, ground=None, quick=False):
+    settings = rj.hover_settings(**(COARSE if quick else SETTINGS))
+    return rj.free_wake(*rj.rotor("knight_hefner_2", 8.0), ground, settings, surfaces)
+
+
+def through(model, state, middles, normals):
+    """Normal velocity (I, P) of the wake alone at panels, at every instant of the blades' passage."""
+    segments, angles = wake_segments(model, state), azimuths(state)
+    instants = len(angles) // model.rotor.blades
+    bare = eqx.tree_at(lambda m: m.surfaces, model, None, is_leaf=lambda x: x is None)
+    flow = at_instants(bare, segments, jnp.broadcast_to(middles, (instants, *middles.shape)), angles)
+    return jnp.sum(flow * normals, axis=-1)
+
+
+def moments(solved):
+    """Hub moments of rigid blades over ρA(ΩR)²R: (C_l, C_m), load to starboard and load ahead positive."""
+    load = np.asarray(solved.dct_dr) * np.asarray(solved.found.widths) * np.asarray(solved.r)
+    psi = np.asarray(solved.psi)[:, None]
+    if psi.size == 1:
+        return 0.0, 0.0
+    return float((load * np.sin(psi)).sum(axis=1).mean()), float(-(load * np.cos(psi)).sum(axis=1).mean())
+
+
+def limits(quick: bool) -> dict:
+    """A flat patch of panels under the wake over a plane, frozen, against the plane's image."""
+    solved = rj.solve(wake(ground=rj.plane(HEIGHT), quick=quick))
+    model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
+    bare = eqx.tree_at(lambda m: m.ground, model, None)
+    r, psi = np.meshgrid(np.sqrt((np.arange(6) + 0.5) / 6), 2 * np.pi / 16 * np.arange(16))
+    disk = jnp.asarray(np.stack([r * np.cos(psi), r * np.sin(psi), 0 * r], axis=-1).reshape(-1, 3))
+    segments, angles = wake_segments(model, state), azimuths(state)
+
+    @jax.jit
+    def flow(points, which):
+        return at_instants(which, segments, points[None], angles)[0]
+
+    image = (flow(disk, model) - flow(disk, bare))[:, 2]
+    rows = []
+    for panel in (0.25, 0.125) if quick else (0.3, 0.2, 0.1):
+        flat = rj.slab((-8, -8), (8, 8), -HEIGHT, 0.5, panel)
+        top = Panels(flat.corners[np.asarray(flat.normals)[:, 2] > 0.5])
+        normal = jnp.sum(flow(top.middles, bare) * top.normals, axis=1)
+        found = panel_velocity(disk, top.corners, -2 * normal)[:, 2]
+        mean = float(jnp.mean(found) / jnp.mean(image) - 1)
+        most = float(jnp.max(jnp.abs(found - image)) / jnp.max(jnp.abs(image)))
+        rows.append({"panel": panel, "panels": len(top), "mean_off": mean, "worst_off": most})
+        print(json.dumps({"flat patch against image": rows[-1]}), flush=True)
+    return {"patch": rows}
+
+
+def no_flow(solved) -> float:
+    """Most of the normal velocity that is left at a panel's middle, its own share the limit from the air."""
+    model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
+    panels = model.surfaces.panels
+    blown = through(model, state, panels.middles, panels.normals)
+    density = jax.vmap(lambda b: model.surfaces.densities(b, model.ground))(blown)
+    left = jax.vmap(lambda d: normal_flow(panels, model.ground, d))(density) + blown
+    return float(jnp.max(jnp.abs(left)))
+
+
+def derivative(quick: bool) -> dict:
+    """d C_T by the distance of a wall: periodic wake and all, and of the wake held as it is."""
+
+    def beside(distance):
+        return wake(rj.wall(distance, -1.0, 1.0, length=3.0, thickness=0.5, panel=0.5), quick=quick)
+
+    here = rj.solve(beside(1.3), tol=1e-10)
+    step = 1e-4
+    there = [float(rj.solve(beside(1.3 + s), here, tol=1e-10).CT) for s in (step, -step)]
+
+    def thrust(distance):
+        model = beside(distance)
+        return readings(model, periodic_wake(here.found, model)).CT
+
+    def frozen(distance):
+        model = beside(distance)
+        return jnp.mean(evaluate(model, here.found.unknowns).velocities.control[..., 2])
+
+    row = {"implicit": float(jax.jvp(thrust, (1.3,), (1.0,))[1]), "differences": (there[0] - there[1]) / (2 * step)}
+    row["frozen"] = float(jax.jvp(frozen, (1.3,), (1.0,))[1])
+    row["frozen_differences"] = float(frozen(1.3 + 1e-5) - frozen(1.3 - 1e-5)) / 2e-5
+    row |= {"converged": bool(here.converged), "left_through_panels": no_flow(here)}
+    print(json.dumps({"derivative": row}), flush=True)
+    return row
+
+
+def cost(quick: bool) -> dict:
+    """Seconds of a sum over panels × targets, least of three."""
+    rows = []
+    rng = np.random.default_rng(0)
+    for targets in (1000, 10_000) if quick else (1000, 10_000, 100_000):
+        for panel in (0.8, 0.4, 0.2):
+            corners = rj.box((-2, -2, -1), (2, 2, 1), panel).corners
+            points = jnp.asarray(rng.uniform(-3, 3, (targets, 3)))
+            density = jnp.asarray(rng.normal(size=len(corners)))
+            if len(corners) * targets > 2e8:
+                continue
+            panel_velocity(points, corners, density).block_until_ready()
+            spent = []
+            for _ in range(3):
+                began = time.perf_counter()
+                panel_velocity(points, corners, density).block_until_ready()
+                spent.append(time.perf_counter() - began)
+            pairs = len(corners) * targets
+            rows.append(
+                {"panels": len(corners), "targets": targets, "seconds": min(spent), "ns": min(spent) / pairs * 1e9}
+            )
+            print(json.dumps({"cost": rows[-1]}), flush=True)
+    began = time.perf_counter()
+    body = rj.box((-2, -2, -1), (2, 2, 1), 0.25 if quick else 0.14)
+    solid(body).inverse.block_until_ready()
+    print(json.dumps({"matrix and inverse, cold": time.perf_counter() - began, "panels": len(body)}), flush=True)
+    return {"pairs": rows}
+
+
+def roof(quick: bool) -> list[dict]:
+    """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive."""
+    rows, last, open_air = [], None, rj.solve(wake(quick=quick))
+    alone = float(open_air.mean_inflow / jnp.sqrt(open_air.CT))
+    house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.5 if quick else 0.35)
+    for edge in sorted(PLACES[::2] if quick else PLACES, reverse=True):
+        house = house_at_hub.moved((float(edge), 0, 0))
+        began = time.perf_counter()
+        solved = rj.solve(wake(house, quick=quick), last)
+        c_l, c_m = moments(solved)
+        row = {"edge": float(edge), "CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
+        row["inflow_ratio"] = float(solved.mean_inflow / jnp.sqrt(solved.CT)) / alone
+        row |= {"converged": bool(solved.converged), "why": solved.why, "left": no_flow(solved), "panels": len(house)}
+        row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations}
+        print(json.dumps({"roof": row}), flush=True)
+        rows.append(row)
+        last = solved if solved.converged else None
+    return rows
+
+
+def of_finite_states(thrust: float) -> np.ndarray:
+    """Mean inflow over √(C_T/2) at each of PLACES by the finite states, and without a roof."""
+    settings = {"ground_harmonics": 6, "ground_radial_terms": 5, "ground_parity": "odd", "harmonics": 1}
+    flow = finite_state_model(
+        rj.plane(HEIGHT), quadrature=DiskQuadrature(24, 32), region=half_plane(0.0), ground_radius=2.0, **settings
+    )
+    tau = jnp.zeros(len(flow.modes)).at[0].set(np.sqrt(3) / 4 * thrust)
+
+    @eqx.filter_jit
+    def one(place):
+        here = eqx.tree_at(lambda m: m.region.edge, flow, place)
+        return mean_inflow(steady_state(here, tau), here)
+
+    return np.array([float(one(jnp.asarray(e))) for e in (*PLACES, -60.0)])
+
+
+def hangar(quick: bool) -> tuple[dict, object]:
+    """A rotor over ground beside a wall that stands 1.2 R to starboard; and without the wall."""
+    ground = rj.plane(HEIGHT)
+    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.5 if quick else 0.2)
+    rows = {}
+    for name, surfaces in (("open", None), ("wall", wall)):
+        solved = rj.solve(wake(surfaces, ground, quick))
+        c_l, c_m = moments(solved)
+        rows[name] = {"CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
+        rows[name] |= {"converged": bool(solved.converged), "why": solved.why, "iterations": solved.found.iterations}
+        rows[name] |= {"seconds": solved.found.wall_time_s}
+        if surfaces is not None:
+            rows[name] |= {"left": no_flow(solved), "panels": len(surfaces)} | at_the_wall(solved)
+        print(json.dumps({name: rows[name]}), flush=True)
+    return rows, solved
+
+
+def at_the_wall(solved) -> dict:
+    """Share of the wake's free nodes that have come into the wall, and the flow through its face between the middles of
+    panels, rms over that of the wake without it, 0.02 R before it.
+    """
+    model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
+    x, y, z = np.moveaxis(np.asarray(rotate_about_shaft(state.far, azimuths(state)[:, None, None])), -1, 0)
+    inside = (y > 1.2) & (y < 1.7) & (np.abs(x) < 2) & (z < 1)
+    x, z = np.meshgrid(np.linspace(-1.9, 1.9, 39), np.linspace(-0.95, 0.95, 20))
+    face = jnp.asarray(np.stack([x, 1.18 + 0 * x, z], axis=-1).reshape(-1, 3))
+    bare = eqx.tree_at(lambda m: m.surfaces, model, None)
+    left, wanted = (jnp.sqrt(jnp.mean(velocity(state, face, m)[..., 1] ** 2)) for m in (model, bare))
+    return {"nodes_inside": float(inside.mean()), "through_face": float(left / wanted)}
+
+
+def draw_roof(rows: list[dict], path: Path) -> None:
+    """Inflow, thrust and moments over the place of the edge."""
+    edge = np.array([row["edge"] for row in rows])
+    ok = np.array([row["converged"] for row in rows])
+    ratio = np.array([row["inflow_ratio"] for row in rows])
+    states = of_finite_states(float(rows[-1]["CT"]))
+    with style():
+        figure = new_figure(9, 3.4)
+        first, second = figure.subplots(1, 2)
+        first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
+        first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
+        first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
+        first.legend()
+        for name, label in (("C_l", "roll: load to starboard"), ("C_m", "pitch: load ahead")):
+            second.plot(
+                edge[ok], [row[name] / row["CT"] for row, good in zip(rows, ok, strict=True) if good], "o-", label=label
+            )
+        second.set(xlabel="edge of the roof aft of the hub, x/R", ylabel="hub moment over $C_T$")
+        second.legend()
+    save_file(figure, path)
+
+
+def draw_hangar(solved, path: Path) -> None:
+    """Mean flow in the upright plane through shaft and wall."""
+    s, z = np.meshgrid(np.linspace(-2.5, 1.195, 75), np.linspace(-HEIGHT + 0.01, 1.2, 45))
+    points = np.stack([0 * s, s, z], axis=-1).reshape(-1, 3)
+    flow = np.asarray(rj.velocity(solved, jnp.asarray(points))).reshape(*s.shape, 3)
+    with style():
+        figure = new_figure(7.5, 4.6)
+        axes = figure.add_subplot()
+        speed = np.hypot(flow[..., 1], flow[..., 2])
+        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.12, 13), cmap="viridis", extend="max")
+        axes.streamplot(
+            s[0], z[:, 0], flow[..., 1], flow[..., 2], color="white", linewidth=0.5, arrowsize=0.6, density=1.4
+        )
+        axes.plot([-1, 1], [0, 0], color="black", linewidth=2.5)
+        axes.fill_between([1.2, 1.7], -HEIGHT, 1.0, color="#7a5c3e")
+        axes.axhline(-HEIGHT, color="#7a5c3e", linewidth=3)
+        axes.set(xlabel="to starboard, y/R", ylabel="z/R", aspect="equal", xlim=(-2.5, 1.7), ylim=(-HEIGHT - 0.03, 1.2))
+        axes.grid(visible=False)
+        figure.colorbar(filled, ax=axes, label=r"mean speed in the plane over $\Omega R$", shrink=0.8)
+    save_file(figure, path)
+
+
+PARTS = ("limits", "derivative", "cost", "roof", "hangar")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--quick", action="store_true", help="coarser wake, larger panels, fewer places")
+    parser.add_argument("--json", type=Path, help="file for all numbers")
+    parser.add_argument("--out", type=Path, help="folder for roof.png and hangar.png")
+    chosen = parser.parse_args()
+    found = {}
+    for part in chosen.parts:
+        found[part] = globals()[part](chosen.quick)
+        if part == "hangar":
+            found[part], solved = found[part]
+        if chosen.out is not None and part in ("roof", "hangar"):
+            chosen.out.mkdir(parents=True, exist_ok=True)
+            draw_roof(found[part], chosen.out / "roof.png") if part == "roof" else draw_hangar(
+                solved, chosen.out / "hangar.png"
+            )
+    if chosen.json is not None:
+        chosen.json.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main()

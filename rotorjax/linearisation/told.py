@@ -1,0 +1,84 @@
+"""What linear rotors in hover and in flight tell alike: title, errors by name, modes, roots."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rotorjax.bench.plotting import INK, new_figure, series_colours, style
+from rotorjax.linearisation.found import LinearRotor
+from rotorjax.linearisation.modes import Mode
+from rotorjax.ode.models import LinearModel
+from rotorjax.trim.run import FREE_WAKE
+
+MOST_TOLD = 4
+"""States of a mode that are told in a table."""
+
+
+def title_of(found: LinearRotor) -> str:
+    """The flight in words."""
+    request = found.result.request
+    inflow = "in its free wake" if request.inflow == FREE_WAKE else request.inflow
+    flies = f"advance ratio {request.advance:g}" if request.advance else "hover"
+    place = "out of ground effect" if request.height is None else f"h = {request.height:g} R"
+    place += f", slope {request.slope_deg:g}°" if request.slope_deg else ""
+    return f"{request.rotor.name}, {inflow}, C_T = {found.result.means.CT:.5f}, {flies}, {place}"
+
+
+def by_name(model: LinearModel, values: np.ndarray) -> dict[str, dict[str, float | None]]:
+    """Values (q, m) by output, then input, None where absent."""
+    clean = [[None if np.isnan(v) else float(v) for v in row] for row in values]
+    rows = [dict(zip(model.inputs, row, strict=True)) for row in clean]
+    return dict(zip(model.outputs, rows, strict=True))
+
+
+def signals(names: Sequence[str], units: Sequence[str], values: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Unit and trim value of each."""
+    return {n: {"unit": u, "trim": float(v)} for n, u, v in zip(names, units, values, strict=True)}
+
+
+def pairs(model: LinearModel, told: np.ndarray, *columns: np.ndarray) -> list[tuple]:
+    """A row for each response of which `told` (q, m) is a number, with its values in the columns."""
+    return [
+        (f"{out} per {name}", *(column[q, m] for column in columns))
+        for m, name in enumerate(model.inputs)
+        for q, out in enumerate(model.outputs)
+        if not np.isnan(told[q, m])
+    ]
+
+
+def part_of(mode: Mode) -> str:
+    """Who takes part."""
+    return ", ".join(f"{k} {v:.2f}" for k, v in list(mode.states.items())[:MOST_TOLD])
+
+
+def mode_content(mode: Mode) -> dict[str, Any]:
+    """A mode as linearise.json has it."""
+    return {
+        "name": mode.name,
+        "growth": mode.exponent.real,
+        "frequency": mode.exponent.imag,
+        "damping_ratio": mode.damping,
+        "shares": mode.shares,
+        "states": mode.states,
+    }
+
+
+def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio") -> Figure:
+    """Exponents in the plane; of several flights each mode is a line from the first (open) to the last."""
+    paths: dict[str, list[complex]] = {}
+    for modes in by_value.values():
+        for mode in modes:
+            paths.setdefault(mode.name, []).append(mode.exponent)
+    with style():
+        figure = new_figure(8.5, 5.0)
+        axes = figure.subplots()
+        axes.axvline(0, color=INK, lw=0.8)
+        for (name, values), colour in zip(paths.items(), series_colours(len(paths)), strict=True):
+            axes.plot(np.real(values), np.imag(values), "-", color=colour, lw=1, marker="o", label=name)
+            axes.plot(np.real(values[0]), np.imag(values[0]), "o", color=colour, mfc="white")
+        span = ", ".join(f"{value:g}" for value in by_value)
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=f"{label} {span}")
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure

@@ -1,0 +1,1 @@
+"""Solid surfaces as flat panels of sources: their flow, their strengths, and how they are made."""

@@ -1,0 +1,218 @@
+"""Solid surfaces in a flow: panels, and the source densities that close them.
+
+Air in which u·n blows through the middle of a panel is kept out by sources of density σ with
+
+    σ_i/2 + Σ_j≠i a_ij σ_j = −(u·n)_i,
+
+a_ij the normal velocity at middle i by panel j at density 1 (with its image, over a plane): N equations for N panels,
+the matrix inverted once. Sources stop air on the side that normals point to. Behind an open surface, a sheet, it comes
+out again; a closed one stops it all round, which a deck or a roof wants: give them some thickness.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.custom_derivatives import SymbolicZero
+from jaxtyping import ArrayLike, Float
+
+from rotorjax.checks import array, known
+from rotorjax.errors import InputError
+from rotorjax.ground import Plane
+from rotorjax.panels.kernel import normal_velocities, panel_velocity
+
+MOST = 4000
+"""Panels whose matrix is still inverted: 128 MB, some seconds."""
+
+ON_GROUND = 1e-6
+"""Distance over R from the ground within which a face rests on it and is left out."""
+
+FOOTPRINT = 0.7
+"""Radius over R of the Gaussian with which what lies under a rotor counts for its floor."""
+
+DEEPEST = 100.0
+"""Depth over R of the floor where nothing lies under the rotor: a wake over it is that in free air, to 1e-6."""
+
+
+class Panels(eqx.Module):
+    """Flat panels. corners (P, 4, 3): over R, in the hub frame (x aft, y to starboard, z up) that does not turn,
+    counter-clockwise seen from the air; a triangle has its last corner twice.
+    """
+
+    corners: Float[Array, "P 4 3"]
+
+    def __len__(self) -> int:
+        """P."""
+        return len(self.corners)
+
+    def __add__(self, other: "Panels") -> "Panels":
+        """Both surfaces."""
+        return Panels(jnp.concatenate([self.corners, other.corners]))
+
+    @property
+    def halves(self) -> Float[Array, "2 P 3"]:
+        """Vector areas of the two triangles that a panel is made of."""
+        a, b, c, d = jnp.moveaxis(self.corners, 1, 0)
+        return 0.5 * jnp.stack([jnp.cross(b - a, c - a), jnp.cross(c - a, d - a)])
+
+    @property
+    def areas(self) -> Float[Array, " P"]:
+        """Areas over R²."""
+        return jnp.linalg.norm(jnp.sum(self.halves, axis=0), axis=-1)
+
+    @property
+    def normals(self) -> Float[Array, "P 3"]:
+        """Unit normals, into the air."""
+        return jnp.sum(self.halves, axis=0) / self.areas[:, None]
+
+    @property
+    def middles(self) -> Float[Array, "P 3"]:
+        """Centroids: where no air goes through."""
+        share = jnp.sum(self.halves * self.normals, axis=-1) / self.areas
+        thirds = jnp.stack([self.corners[:, :3].mean(axis=1), self.corners[:, np.array([0, 2, 3])].mean(axis=1)])
+        return jnp.sum(share[..., None] * thirds, axis=0)
+
+    def moved(self, by: ArrayLike | Sequence[ArrayLike]) -> "Panels":
+        """The same surface elsewhere, over R."""
+        return Panels(self.corners + jnp.asarray(by, float))
+
+
+class Solid(eqx.Module):
+    """Surfaces that no air goes through, over a plane that mirrors them or none.
+
+    panels: all of them. inverse (P, P): of the matrix of normal velocities; it belongs to the numbers of `panels` and
+    of the plane, so make it anew where they change (`refitted`). share: of the panels' flow that counts, 1 in every
+    physical case; a search may start below.
+    """
+
+    panels: Panels
+    inverse: Float[Array, "P P"]
+    share: Float[Array, ""]
+
+    def densities(self, through: Float[Array, " P"], ground: Plane | None = None) -> Float[Array, " P"]:
+        """Source densities over ΩR that answer a flow with these normal velocities at the panels' middles."""
+        return _solved(self.panels, ground, self.inverse, -through)
+
+    def answer(
+        self, points: Float[Array, "N 3"], through: Float[Array, " P"], ground: Plane | None = None
+    ) -> Float[Array, "N 3"]:
+        """Velocity at points with which the surfaces answer a flow with these normal velocities at their middles."""
+        return self.share * panel_velocity(points, self.panels.corners, self.densities(through, ground), ground)
+
+
+@jax.jit
+def influence(panels: Panels, ground: Plane | None = None) -> Float[Array, "P P"]:
+    """Normal velocity at each panel's middle, on the side of the air, by each panel of density 1 and its image."""
+    middles, normals = panels.middles, panels.normals
+    own = jnp.eye(len(panels), dtype=middles.dtype)
+    found = normal_velocities(middles, normals, panels.corners)
+    found = (1 - own) * found + 0.5 * own
+    if ground is None:
+        return found
+    # what an image induces at a point is the mirror of what its panel induces at the mirror point
+    return found + normal_velocities(ground.reflect_points(middles), ground.reflect_vectors(normals), panels.corners)
+
+
+def normal_flow(panels: Panels, ground: Plane | None, density: Float[Array, " P"]) -> Float[Array, " P"]:
+    """`influence` times densities, without the matrix."""
+    flow = panel_velocity(panels.middles, panels.corners, density, ground)
+    normals = panels.normals
+    # a panel's own flow at its middle is along the panel; its own part of n·v is the limit from the air, a half
+    return jnp.sum(flow * normals, axis=1) + 0.5 * density
+
+
+@jax.custom_jvp
+def _solved(panels: Panels, ground: Plane | None, inverse: Array, b: Array) -> Array:
+    """Densities with influence @ σ = b; how they move with panels and ground needs no derivative of the matrix."""
+    return inverse @ b
+
+
+def _moved(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    """A dσ = db − dA σ, the last term only where panels or ground move."""
+    panels, ground, inverse, _ = primals
+    density = _solved(*primals)
+    still = [isinstance(t, SymbolicZero) for t in jax.tree.leaves(tangents[:2])]
+    moved_panels, moved_ground, _, change = jax.tree.map(_dense, tangents)
+    if not all(still):
+        both = (panels, ground), (moved_panels, moved_ground)
+        change = change - jax.jvp(lambda p, g: normal_flow(p, g, density), *both)[1]
+    return density, _solved(panels, ground, inverse, change)
+
+
+_solved.defjvp(_moved, symbolic_zeros=True)
+
+
+def _dense(tangent: Array | SymbolicZero) -> Array:
+    return jnp.zeros(tangent.shape, tangent.dtype) if isinstance(tangent, SymbolicZero) else tangent  # type: ignore[arg-type]
+
+
+def solid(surfaces: Panels, ground: Plane | None = None) -> Solid:
+    """Close surfaces to the air: leave out what rests on the ground, and invert the matrix of normal velocities.
+
+    Raises InputError where nothing is left, a panel has no area or lies under the ground, or there are more than MOST.
+    """
+    kept = _checked(surfaces, ground)
+    fixed = jax.lax.stop_gradient((kept, ground))
+    return Solid(kept, _inverse(*fixed), array(1.0))
+
+
+@jax.jit
+def _inverse(panels: Panels, ground: Plane | None) -> Array:
+    return jnp.linalg.inv(influence(panels, ground))
+
+
+def refitted(surfaces: Solid, ground: Plane | None) -> Solid:
+    """The same surfaces with the inverse that belongs to their numbers and the ground's."""
+    return replace(surfaces, inverse=_inverse(*jax.lax.stop_gradient((surfaces.panels, ground))))
+
+
+def _checked(surfaces: Panels, ground: Plane | None) -> Panels:
+    """Surfaces without the faces that rest on the ground; traced ones are looked at as numbers, if they can be."""
+    numbers = jax.lax.stop_gradient((surfaces, ground))
+    if not known(numbers):
+        return surfaces
+    panels, plane = numbers
+    areas = np.asarray(panels.areas)
+    if not np.all(areas > 0) or not np.all(np.isfinite(np.asarray(panels.corners))):
+        worst = int(np.argmin(np.where(np.isfinite(areas), areas, -1)))
+        raise InputError(
+            f"Argument `surfaces` must hold panels with an area, but panel {worst} with corners "
+            f"{np.asarray(panels.corners[worst]).tolist()} has none: leave it out"
+        )
+    if plane is not None:
+        above = np.asarray(plane.distance(panels.corners))
+        if np.any(above < -ON_GROUND):
+            raise InputError(
+                f"Argument `surfaces` must stay above the ground, but reaches {-above.min():.3g} R below it: "
+                "end it on the ground, where its foot is left out"
+            )
+        surfaces = Panels(surfaces.corners[np.any(above > ON_GROUND, axis=1)])
+    if not 0 < len(surfaces) <= MOST:
+        raise InputError(
+            f"Argument `surfaces` must hold 1 to {MOST} panels above the ground, but holds {len(surfaces)}: "
+            "make the panels larger"
+        )
+    return surfaces
+
+
+def floor(panels: Panels, ground: Plane | None) -> Plane:
+    """Level plane that stands for what lies under a rotor: 1/height is the mean of 1/depth over its footprint.
+
+    The footprint is a Gaussian about the shaft; what no panel under the hub covers is as deep as the ground. It serves
+    the wake where only a plane is known: turns beyond the free ones, a search's start. Over a large roof it is the
+    roof; beside a rotor's footprint nothing; smooth between.
+    """
+    middles = panels.middles
+    depth = jnp.maximum(-middles[:, 2], 1e-2)
+    near = jnp.exp(-0.5 * jnp.sum(middles[:, :2] ** 2, axis=1) / FOOTPRINT**2) / (2 * jnp.pi * FOOTPRINT**2)
+    facing_up = panels.areas * jnp.maximum(panels.normals[:, 2], 0) * (middles[:, 2] < 0)
+    share = facing_up * near
+    covered = jnp.sum(share)
+    deepest = 1 / DEEPEST if ground is None else 1 / ground.height
+    mean = (jnp.sum(share / depth) + jnp.maximum(1 - covered, 0) * deepest) / jnp.maximum(covered, 1)
+    height = 1 / jnp.maximum(mean, 1 / DEEPEST)
+    return Plane(height, jnp.zeros_like(height))
