@@ -322,6 +322,7 @@ def unit_states(model: FiniteStateModel) -> UnitStates:
     return UnitStates(sources, down, mean_upflow(model, model.ground) @ sources)
 
 
+@eqx.filter_jit
 def mass_flow_parameters(
     model: FiniteStateModel,
     tau: Float[Array, " M"],
@@ -402,6 +403,7 @@ def unit_inflow(
     return down - jnp.tensordot(unit.sources.T, ground_upflow(model, model.ground, points), 1)
 
 
+@eqx.filter_jit
 def disk_inflow(
     state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel
 ) -> Float[Array, "*N"]:

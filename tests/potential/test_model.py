@@ -259,13 +259,13 @@ def test_derivative_ladder(outcome, v):
     np.testing.assert_allclose(forward[1], reverse[1], rtol=1e-11, atol=1e-12)
 
 
-def test_a_thousand_grounds_in_one_call():
-    heights, slopes = jnp.meshgrid(jnp.linspace(0.8, 3.0, 40), jnp.linspace(0, 0.6, 25), indexing="ij")
-    wake = jnp.broadcast_to(jnp.array([0.75, 0.2, 0.9]), (1000, 3))
+def test_many_grounds_in_one_call():
+    heights, slopes = jnp.meshgrid(jnp.linspace(0.8, 3.0, 8), jnp.linspace(0, 0.6, 5), indexing="ij")
+    wake = jnp.broadcast_to(jnp.array([0.75, 0.2, 0.9]), (40, 3))
     v = jnp.concatenate([jnp.stack([heights.ravel(), slopes.ravel()], axis=-1), wake], axis=-1)
     batch = jax.jit(jax.vmap(lambda v: outcome(v, THREE_TERMS)))(v)
-    assert batch.shape == (1000, 9)
-    for i in (0, 517, 999):
+    assert batch.shape == (40, 9)
+    for i in (0, 23, 39):
         np.testing.assert_allclose(batch[i], outcome(v[i], THREE_TERMS), rtol=1e-12)
 
 
