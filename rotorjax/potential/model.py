@@ -313,6 +313,7 @@ class UnitStates(eqx.Module):
     up: Float[Array, " M"]
 
 
+@eqx.filter_jit
 def unit_states(model: FiniteStateModel) -> UnitStates:
     """Return what unit rotor states make."""
     down = rotor_means(model, model.ground)
@@ -367,6 +368,7 @@ def steady_state(
     return FiniteState(a, unit.sources @ a)
 
 
+@eqx.filter_jit
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
     """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
     if model.ground is None:
@@ -382,6 +384,7 @@ def rotor_flow(
     return disk_functions(model.modes, x, y) if wake is None else disk_flow(model.modes, x, y, wake)
 
 
+@eqx.filter_jit
 def rotor_velocity(
     model: FiniteStateModel, ground: Plane | None, points: Float[Array, "*N 3"]
 ) -> Float[Array, "3 M ..."]:
@@ -392,6 +395,7 @@ def rotor_velocity(
     return wake_flow(field_functions, model.modes, points, wake)
 
 
+@eqx.filter_jit
 def unit_inflow(
     model: FiniteStateModel, unit: UnitStates, x: Float[Array, "*N"], y: Float[Array, "*N"]
 ) -> Float[Array, "M ..."]:
