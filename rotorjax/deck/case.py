@@ -172,7 +172,7 @@ def _build(data: Tables, folder: Path) -> DeckCase:
     return case
 
 
-def _collective(body: Tables, path: Tables, usual: float) -> Float[np.ndarray, " P"]:
+def _collective(body: dict[str, Any], path: dict[str, Any], usual: float) -> Float[np.ndarray, " P"]:
     """Collective (rad) at the path's points: its own, or the rotor's all the way."""
     if "collective_deg" not in path:
         return np.full(len(path["t"]), np.deg2rad(body["collective_deg"]) if "collective_deg" in body else usual)
