@@ -434,6 +434,7 @@ STATIC = {  # numbers and tables that no one differentiates
 QUICK = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
 
 
+@pytest.mark.slow  # all together
 @pytest.mark.parametrize("rung", RUNGS, ids=lambda rung: rung.covers[0])
 def test_ladder(rung):
     names = list(rung.points)
