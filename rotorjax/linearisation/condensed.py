@@ -80,10 +80,11 @@ def shares_of(states: tuple[str, ...]) -> tuple[int, int]:
 
 
 def aligned(found: Sequence[Condensed]) -> list[PeriodicModel]:
-    """Models of several flights with states that mean the same in all of them, so that matrices may be interpolated.
+    """Models of several flights with states that mean the same in all of them.
 
     Coordinates in the directions that all their bases have most in common (Panzer et al. 2010,
-    doi:10.1524/auto.2010.0844), the wake's and the differential ones each among themselves. Bases of one shape.
+    doi:10.1524/auto.2010.0844), the wake's and the differential ones each among themselves. Bases of one
+    shape. Between flights far apart the matrices are not to be interpolated all the same.
     """
     states = found[0].model.states
     turns = [np.eye(len(states)) for _ in found]

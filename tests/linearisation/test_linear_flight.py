@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -14,14 +15,16 @@ from wakes import COARSE
 from rotorjax.coupled import RotorState
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
-from rotorjax.linearisation import flight, wake_flight
-from rotorjax.linearisation.condensed import Condensed, aligned, condensed, shares_of
+from rotorjax.linearisation import flight, schedule, wake_flight
+from rotorjax.linearisation.condensed import aligned, condensed, shares_of
 from rotorjax.linearisation.drive import drive_of
 from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.hover import Flat, products
 from rotorjax.linearisation.instant import instant
+from rotorjax.linearisation.modes import Mode
 from rotorjax.linearisation.rotor import Base, SteadyState
 from rotorjax.linearisation.settled import Passage, mirrored, settled
+from rotorjax.ode.harmonic import average
 from rotorjax.ode.orbit import make_orbit
 from rotorjax.ode.outcome import Outcome
 from rotorjax.ode.repeated import leading
@@ -117,27 +120,60 @@ def test_leading_exponents_are_those_of_the_dense_monodromy_matrix(model):
     assert modes["collective lag"].shares["lag"] == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_condensed_model_keeps_the_blades_and_the_steps(model):
-    truth = model.step(4)
-    errors = []
-    for states in (20, 60):
-        small, basis = condensed(model, 4, np.abs(truth).max(axis=0), states)
-        assert small.order == 16 + states
-        assert small.states[:2] == ("beta_0", "beta_1c")
-        own = np.stack([small.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
-        errors.append(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0))
-    assert np.median(errors[1]) < min(0.015, 0.5 * np.median(errors[0]))
-    one = Condensed(small, basis)
-    other = condensed(model, 4, np.abs(truth).max(axis=0) ** 0.5, states, shares_of(small.states))
+@pytest.fixture(scope="module")
+def truth(model):
+    return model.step(4)
+
+
+@pytest.fixture(scope="module")
+def one(model, truth):
+    return condensed(model, 4, np.abs(truth).max(axis=0), 60)
+
+
+@pytest.fixture(scope="module")
+def other(model, truth, one):
+    """The same flight in other directions."""
+    return condensed(model, 4, np.abs(truth).max(axis=0) ** 0.5, 60, shares_of(one.model.states))
+
+
+def gap(truth, model):
+    """Largest differences of its unit steps, over the largest values."""
+    own = np.stack([model.step(column)[1] for column in np.eye(len(INPUTS))], axis=-1)
+    return np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0)
+
+
+def test_a_condensed_model_keeps_the_blades_and_the_steps(model, truth, one):
+    coarse = condensed(model, 4, np.abs(truth).max(axis=0), 20).model
+    assert (coarse.order, one.model.order) == (36, 76)
+    assert one.model.states[:2] == ("beta_0", "beta_1c")
+    assert np.median(gap(truth, one.model)) < min(0.015, 0.5 * np.median(gap(truth, coarse)))
+
+
+def test_condensed_models_of_several_flights_have_states_of_one_meaning(truth, one, other):
+    """One flight in two bases: in common coordinates what lies between is it, too."""
+    assert other.model.states == one.model.states
+    assert np.linalg.norm(one.model.b - other.model.b) > 0.1 * np.linalg.norm(one.model.b)
     turned = aligned([one, other])
-    assert other.model.states == small.states
-    assert np.linalg.norm(one.model.b - other.model.b) > 0.1 * np.linalg.norm(small.b)  # other directions
     for own, before in zip(turned, (one.model, other.model), strict=True):
-        np.testing.assert_allclose(own.step(np.ones(len(INPUTS)))[1], before.step(np.ones(len(INPUTS)))[1], rtol=1e-6)
-    # the same model in both coordinates: what is between is it, too
+        np.testing.assert_allclose(gap(truth, own), gap(truth, before), atol=1e-8)
     middle = replace(turned[0], **{name: (getattr(turned[0], name) + getattr(turned[1], name)) / 2 for name in "abc"})
-    own = np.stack([middle.step(one)[1] for one in np.eye(len(INPUTS))], axis=-1)
-    assert np.median(np.abs(own - truth).max(axis=0) / np.abs(truth).max(axis=0)) < 0.03
+    assert np.median(gap(truth, middle)) < 0.03
+
+
+def test_several_flights_make_one_scheduled_model(one, other):
+    none, flights = np.zeros((len(OUTPUTS), len(INPUTS))), []
+    for advance, part in ((0.1, one), (0.2, other)):
+        asked = SimpleNamespace(request=request("uh60", 0.00575, "freewake", advance=advance))
+        wake = wake_flight.InWake(0, 0, (), 0.0, none, none, 0.0, part.basis)
+        full, named = average(part.model), (Mode("coning", -0.5 + advance * 1j, {}, {}),)
+        flights.append(flight.LinearFlight(asked, full, None, named, {}, part.model, (0,), none, none, none, wake))
+    data = schedule.stitched(flights, "azimuth")
+    assert list(data.advance_ratio.values) == [0.1, 0.2]
+    np.testing.assert_allclose(data.frequency.sel(mode="coning"), [0.1, 0.2])
+    for k, found in enumerate(flights):
+        poles, own = (np.sort(np.linalg.eigvals(a).real) for a in (data["A"][k].values, found.full.a))
+        np.testing.assert_allclose(poles, own, atol=1e-6)
+    assert schedule.alike([replace(flights[0], wake=None)])[0] is flights[0].full
 
 
 BAD = {
