@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import rotorjax as rj
-from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, save_file, style
+from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, legend_below, new_figure, save_file, style
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
@@ -251,19 +251,19 @@ def draw_roof(rows: list[dict], path: Path) -> None:
     ratio = np.array([row["inflow_ratio"] for row in rows])
     states = of_finite_states(float(rows[-1]["CT"]))
     with style():
-        figure = new_figure(9, 3.4)
+        figure = new_figure(9.5, 4.2)
         first, second = figure.subplots(1, 2)
         first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
         first.axhline(rows[0]["whole_ground"], color=FREE_WAKE, linestyle=":", label="free wake, whole ground")
         first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
         first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
-        first.legend()
+        legend_below(first, 2)
         for name, label in (("C_l", "roll: load to starboard"), ("C_m", "pitch: load ahead")):
             second.plot(
                 edge[ok], [row[name] / row["CT"] for row, good in zip(rows, ok, strict=True) if good], "o-", label=label
             )
         second.set(xlabel="edge of the roof aft of the hub, x/R", ylabel="hub moment over $C_T$")
-        second.legend(loc="upper right", bbox_to_anchor=(1.0, 0.75))
+        legend_below(second, 2)
     save_file(figure, path)
 
 
