@@ -30,7 +30,7 @@ def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
 
     >>> hangar = box((2, -1, -1), (4, 1, 0.5), panel=0.5)
     >>> len(hangar), round(float(hangar.areas.sum()), 6)
-    (68, 20.0)
+    (52, 20.0)
     """
     low, high = _corner("low", low), _corner("high", high)
     if known(low, high) and not np.all(np.asarray(high - low) > 0):
