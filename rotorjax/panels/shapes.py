@@ -29,7 +29,7 @@ def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
     out where the box is put into a flow. Raises InputError where high is not above low, or panels are too many.
 
     >>> hangar = box((2, -1, -1), (4, 1, 0.5), panel=0.5)
-    >>> len(hangar), round(float(hangar.areas.sum()), 6)
+    >>> len(hangar), round(float(hangar.areas.sum()), 3)
     (52, 20.0)
     """
     low, high = _corner("low", low), _corner("high", high)
