@@ -18,12 +18,13 @@ import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, new_figure, save_file, style
-from rotorjax.frames import rotate_about_shaft
+from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 from rotorjax.region import half_plane
+from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.field import at_instants, velocity, wake_segments
 from rotorjax.wake.model import azimuths
@@ -63,30 +64,43 @@ def moments(solved):
 
 
 def limits(quick: bool) -> dict:
-    """A flat patch of panels under the wake over a plane, frozen, against the plane's image."""
+    """A flat patch of panels against the image: of a vortex ring, and of the wake over a plane as it is.
+
+    Sources and image are the same for a potential flow, which a ring's is; a wake's filaments fade, end and have cores.
+    """
     solved = rj.solve(wake(ground=rj.plane(HEIGHT), quick=quick))
     model, state = solved.found.model, jax.tree.map(jnp.asarray, solved.found.state)
     bare = eqx.tree_at(lambda m: m.ground, model, None)
-    r, psi = np.meshgrid(np.sqrt((np.arange(6) + 0.5) / 6), 2 * np.pi / 16 * np.arange(16))
-    disk = jnp.asarray(np.stack([r * np.cos(psi), r * np.sin(psi), 0 * r], axis=-1).reshape(-1, 3))
     segments, angles = wake_segments(model, state), azimuths(state)
+    corners = disk_points(jnp.full(145, 0.8), jnp.linspace(0, 2 * jnp.pi, 145)) - jnp.array([0, 0, 0.5])
+    ring = corners[:-1], corners[1:], jnp.ones(144), jnp.full(144, 0.01)
 
-    @jax.jit
-    def flow(points, which):
-        return at_instants(which, segments, points[None], angles)[0]
+    def of_wake(points, plane):
+        return at_instants(bare if plane is None else model, segments, points[None], angles)[0]
 
-    image = (flow(disk, model) - flow(disk, bare))[:, 2]
+    def of_ring(points, plane):
+        return segment_velocity(points, *ring, plane=plane)
+
     rows = []
-    for panel in (0.25, 0.125) if quick else (0.3, 0.2, 0.1):
-        flat = rj.slab((-8, -8), (8, 8), -HEIGHT, 0.5, panel)
-        top = Panels(flat.corners[np.asarray(flat.normals)[:, 2] > 0.5])
-        normal = jnp.sum(flow(top.middles, bare) * top.normals, axis=1)
-        found = panel_velocity(disk, top.corners, -2 * normal)[:, 2]
-        mean = float(jnp.mean(found) / jnp.mean(image) - 1)
-        most = float(jnp.max(jnp.abs(found - image)) / jnp.max(jnp.abs(image)))
-        rows.append({"panel": panel, "panels": len(top), "mean_off": mean, "worst_off": most})
-        print(json.dumps({"flat patch against image": rows[-1]}), flush=True)
+    for name, flow in (("ring", of_ring), ("wake", of_wake)):
+        for panel in (0.25, 0.125) if quick else (0.3, 0.2, 0.1):
+            rows.append({"of": name, "panel": panel} | against_image(jax.jit(flow), panel))
+            print(json.dumps({"flat patch against image": rows[-1]}), flush=True)
     return {"patch": rows}
+
+
+def against_image(flow, panel: float) -> dict:
+    """Upflow on the disk of a patch 16 R square against the image's: how far off in the mean, and at worst."""
+    r, psi = np.meshgrid(np.sqrt((np.arange(6) + 0.5) / 6), 2 * np.pi / 16 * np.arange(16))
+    disk = disk_points(jnp.asarray(r.ravel()), jnp.asarray(psi.ravel()))
+    image = (flow(disk, rj.plane(HEIGHT)) - flow(disk, None))[:, 2]
+    flat = rj.slab((-8, -8), (8, 8), -HEIGHT, 0.5, panel)
+    top = Panels(flat.corners[np.asarray(flat.normals)[:, 2] > 0.5])
+    normal = jnp.sum(flow(top.middles, None) * top.normals, axis=1)
+    found = panel_velocity(disk, top.corners, -2 * normal)[:, 2]  # panels of one plane leave each other alone
+    mean = float(jnp.mean(found) / jnp.mean(image) - 1)
+    most = float(jnp.max(jnp.abs(found - image)) / jnp.max(jnp.abs(image)))
+    return {"panels": len(top), "mean_off": mean, "worst_off": most}
 
 
 def no_flow(solved) -> float:
@@ -101,26 +115,30 @@ def no_flow(solved) -> float:
 
 def derivative(quick: bool) -> dict:
     """d C_T by the distance of a wall: periodic wake and all, and of the wake held as it is."""
+    wall = rj.wall(1.3, -1.0, 1.0, length=3.0, thickness=0.5, panel=0.5)
 
-    def beside(distance):
-        return wake(rj.wall(distance, -1.0, 1.0, length=3.0, thickness=0.5, panel=0.5), quick=quick)
+    def beside(farther):
+        return wake(wall.moved((farther, 0.0, 0.0)), quick=quick)
 
-    here = rj.solve(beside(1.3), tol=1e-10)
+    here = rj.solve(beside(0.0), tol=1e-10)
+    print(json.dumps({"beside": float(here.CT), "why": here.why, "left_through_panels": no_flow(here)}), flush=True)
     step = 1e-4
-    there = [float(rj.solve(beside(1.3 + s), here, tol=1e-10).CT) for s in (step, -step)]
+    there = [float(rj.solve(beside(s), here, tol=1e-10).CT) for s in (step, -step)]
+    row = {"differences": (there[0] - there[1]) / (2 * step)}
 
-    def thrust(distance):
-        model = beside(distance)
+    @jax.jit
+    def thrust(farther):
+        model = beside(farther)
         return readings(model, periodic_wake(here.found, model)).CT
 
-    def frozen(distance):
-        model = beside(distance)
-        return jnp.mean(evaluate(model, here.found.unknowns).velocities.control[..., 2])
+    @jax.jit
+    def frozen(farther):
+        return jnp.mean(evaluate(beside(farther), here.found.unknowns).velocities.control[..., 2])
 
-    row = {"implicit": float(jax.jvp(thrust, (1.3,), (1.0,))[1]), "differences": (there[0] - there[1]) / (2 * step)}
-    row["frozen"] = float(jax.jvp(frozen, (1.3,), (1.0,))[1])
-    row["frozen_differences"] = float(frozen(1.3 + 1e-5) - frozen(1.3 - 1e-5)) / 2e-5
-    row |= {"converged": bool(here.converged), "left_through_panels": no_flow(here)}
+    row["frozen_forward"] = float(jax.jvp(frozen, (0.0,), (1.0,))[1])
+    row["frozen_differences"] = float(frozen(1e-4) - frozen(-1e-4)) / 2e-4
+    print(json.dumps({"derivative": row}), flush=True)
+    row["implicit_forward"] = float(jax.jvp(thrust, (0.0,), (1.0,))[1])
     print(json.dumps({"derivative": row}), flush=True)
     return row
 
@@ -156,16 +174,21 @@ def cost(quick: bool) -> dict:
 
 def roof(quick: bool) -> list[dict]:
     """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive."""
-    rows, last, open_air = [], None, rj.solve(wake(quick=quick))
-    alone = float(open_air.mean_inflow / jnp.sqrt(open_air.CT))
+    rows, last = [], None
+    alone, whole = (
+        float(one.mean_inflow / jnp.sqrt(one.CT))
+        for one in (rj.solve(wake(ground=ground, quick=quick)) for ground in (None, rj.plane(HEIGHT)))
+    )
+    print(json.dumps({"inflow over whole ground, over that in free air": whole / alone}), flush=True)
     house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.5 if quick else 0.35)
-    for edge in sorted(PLACES[::2] if quick else PLACES, reverse=True):
+    for edge in (3.0, *PLACES[::-1]):
         house = house_at_hub.moved((float(edge), 0, 0))
         began = time.perf_counter()
         solved = rj.solve(wake(house, quick=quick), last)
         c_l, c_m = moments(solved)
         row = {"edge": float(edge), "CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
         row["inflow_ratio"] = float(solved.mean_inflow / jnp.sqrt(solved.CT)) / alone
+        row["whole_ground"] = whole / alone
         row |= {"converged": bool(solved.converged), "why": solved.why, "left": no_flow(solved), "panels": len(house)}
         row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations}
         print(json.dumps({"roof": row}), flush=True)
@@ -193,7 +216,7 @@ def of_finite_states(thrust: float) -> np.ndarray:
 def hangar(quick: bool) -> tuple[dict, object]:
     """A rotor over ground beside a wall that stands 1.2 R to starboard; and without the wall."""
     ground = rj.plane(HEIGHT)
-    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.5 if quick else 0.2)
+    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.25 if quick else 0.15)
     rows = {}
     for name, surfaces in (("open", None), ("wall", wall)):
         solved = rj.solve(wake(surfaces, ground, quick))
@@ -231,6 +254,7 @@ def draw_roof(rows: list[dict], path: Path) -> None:
         figure = new_figure(9, 3.4)
         first, second = figure.subplots(1, 2)
         first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
+        first.axhline(rows[0]["whole_ground"], color=FREE_WAKE, linestyle=":", label="free wake, whole ground")
         first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
         first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
         first.legend()
@@ -249,10 +273,10 @@ def draw_hangar(solved, path: Path) -> None:
     points = np.stack([0 * s, s, z], axis=-1).reshape(-1, 3)
     flow = np.asarray(rj.velocity(solved, jnp.asarray(points))).reshape(*s.shape, 3)
     with style():
-        figure = new_figure(7.5, 4.6)
+        figure = new_figure(7.5, 4.0)
         axes = figure.add_subplot()
         speed = np.hypot(flow[..., 1], flow[..., 2])
-        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.12, 13), cmap="viridis", extend="max")
+        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.09, 13), cmap="viridis", extend="max")
         axes.streamplot(
             s[0], z[:, 0], flow[..., 1], flow[..., 2], color="white", linewidth=0.5, arrowsize=0.6, density=1.4
         )

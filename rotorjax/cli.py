@@ -49,6 +49,7 @@ def parser() -> argparse.ArgumentParser:
     modules = (study, inflow, trim, sweep, simulate, linearise, validate, calibrate, deck, new, doctor, completion)
     for module in modules:
         module.register(commands)
+    top.set_defaults(program=top)  # completion describes all commands
     return top
 
 

@@ -5,7 +5,7 @@ import rotorjax as rj
 
 hangar = rj.box((1.3, -2.0, -1.0), (2.2, 2.0, 0.5), panel=0.3)
 rotor = rj.rotor("knight_hefner_2", collective_deg=8.0)
-wake = rj.solve(rj.free_wake(*rotor, rj.plane(1.0), rj.quick_settings(), hangar))
+wake = rj.solve(rj.free_wake(*rotor, rj.plane(1.0), rj.quick_settings(tip_core=0.05), hangar))
 x, z = jnp.meshgrid(jnp.linspace(-2.4, 2.6, 81), jnp.linspace(-0.98, 1.0, 41))
 u, _, w = jnp.moveaxis(rj.velocity(wake, jnp.stack([x, 0 * x, z], -1).reshape(-1, 3)).reshape(*x.shape, 3), -1, 0)
 figure, axes = plt.subplots(figsize=(7, 3.2))

@@ -20,10 +20,12 @@ from pathlib import Path
 from typing import Any
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax import __version__
 from rotorjax.calibration import hayden, measured, taught
+from rotorjax.calibration.fit import Fit
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.checks import Range, shown
 from rotorjax.errors import InputError
@@ -159,3 +161,25 @@ def _radial_terms(model: FiniteStateModel) -> int:
 
 def _source_terms(model: FiniteStateModel) -> int:
     return int((model.sources.m == 0).sum())
+
+
+def fit_entry(fit: Fit, name: str, printed_rms: float) -> dict[str, Any]:
+    """The keys that both calibrations share; name: of the parameter set."""
+    return {
+        "set": name,
+        "model_version": MODEL_VERSION,
+        "parameters": fit.parameters.table(fit.values),
+        "printed": fit.parameters.table(fit.parameters.printed),
+        "standard_deviations": fit.parameters.table(np.asarray(fit.deviations)),
+        "covariance": fit.covariance,
+        "rms_error": fit.rms,
+        "rms_error_printed_factor": printed_rms,
+        "converged": fit.converged,
+        "why": fit.why,
+        "at_bound": fit.at_bound,
+        "method": fit.method,
+        "steps": len(fit.history) - 1,
+        "history": fit.history,
+        "wall_time_s": fit.wall_time_s,
+        "compile_time_s": fit.compile_time_s,
+    }

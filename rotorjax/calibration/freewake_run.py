@@ -11,10 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
-from rotorjax.calibration.calibration_file import Calibration
+from rotorjax.calibration.calibration_file import Calibration, fit_entry
 from rotorjax.calibration.drivers import Method, Progress
 from rotorjax.calibration.fit import Fit, calibrate
-from rotorjax.calibration.record import fit_entry
 from rotorjax.calibration.taught import PARAMETERS
 from rotorjax.calibration.teacher import Lessons, default_held, inflow, lessons, residual, rms_difference
 

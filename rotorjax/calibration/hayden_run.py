@@ -11,11 +11,10 @@ import numpy as np
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import select
 from rotorjax.calibration import hayden
-from rotorjax.calibration.calibration_file import Calibration
+from rotorjax.calibration.calibration_file import Calibration, fit_entry
 from rotorjax.calibration.drivers import Method, Progress
 from rotorjax.calibration.fit import Fit, Many, calibrate, calibrate_many, even_starts
 from rotorjax.calibration.hayden import HaydenData
-from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 
 STARTS = 8

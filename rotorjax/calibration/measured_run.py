@@ -11,7 +11,7 @@ from jaxtyping import Float
 from scipy.optimize import least_squares
 
 from rotorjax.bench.settings import study_settings
-from rotorjax.calibration.calibration_file import Calibration
+from rotorjax.calibration.calibration_file import Calibration, fit_entry
 from rotorjax.calibration.drivers import Progress
 from rotorjax.calibration.fit import Fit, conclude, judge
 from rotorjax.calibration.measured import (
@@ -25,7 +25,6 @@ from rotorjax.calibration.measured import (
     with_values,
 )
 from rotorjax.calibration.parameters import ParameterSet
-from rotorjax.calibration.record import fit_entry
 from rotorjax.errors import InputError
 from rotorjax.wake.model import FreeWake, free_wake
 from rotorjax.wake.preconditioner import harmonic_inverse

@@ -20,9 +20,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Print; the exit code."""
     import shtab
 
-    from rotorjax.cli import parser
-
-    top = parser()
+    top: argparse.ArgumentParser = chosen.program
     for each in (top, *_commands(top).values()):
         for action in each._actions:
             if action.type is Path:

@@ -97,10 +97,10 @@ def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
     first = jax.tree.map(lambda v: v[0], given)
     built = time.perf_counter() - began
     start = _trimmed(model, first, case)
-    history = simulate(model, start, psi, given, every)
-    jax.block_until_ready(history)
+    flown = model, start, psi, given, every
+    march = simulate.lower(*flown).compile()
     began = time.perf_counter()
-    jax.block_until_ready(simulate(model, start, psi, given, every))
+    history = jax.block_until_ready(march(*flown))
     marched = time.perf_counter() - began
     if not bool(jnp.all(jnp.isfinite(history.outputs.thrust))):
         raise InputError("Argument `steps_per_turn` must be larger: the march left finite numbers")

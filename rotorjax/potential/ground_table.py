@@ -120,6 +120,7 @@ def flow_matrix(model: FiniteStateModel, ground: Plane, transport: WakeTransport
     return jnp.concatenate([flow, jnp.ones_like(x)[:, None], x[:, None]], axis=1)
 
 
+@eqx.filter_jit
 def response(
     model: FiniteStateModel, ground: Plane, transport: WakeTransport | None, edges: Float[Array, " E"] | None = None
 ) -> Float[Array, "E L C"]:

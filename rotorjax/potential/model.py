@@ -313,6 +313,7 @@ class UnitStates(eqx.Module):
     up: Float[Array, " M"]
 
 
+@eqx.filter_jit
 def unit_states(model: FiniteStateModel) -> UnitStates:
     """Return what unit rotor states make."""
     down = rotor_means(model, model.ground)
@@ -322,6 +323,7 @@ def unit_states(model: FiniteStateModel) -> UnitStates:
     return UnitStates(sources, down, mean_upflow(model, model.ground) @ sources)
 
 
+@eqx.filter_jit
 def mass_flow_parameters(
     model: FiniteStateModel,
     tau: Float[Array, " M"],
@@ -366,6 +368,7 @@ def steady_state(
     return FiniteState(a, unit.sources @ a)
 
 
+@eqx.filter_jit
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
     """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
     if model.ground is None:
@@ -381,6 +384,7 @@ def rotor_flow(
     return disk_functions(model.modes, x, y) if wake is None else disk_flow(model.modes, x, y, wake)
 
 
+@eqx.filter_jit
 def rotor_velocity(
     model: FiniteStateModel, ground: Plane | None, points: Float[Array, "*N 3"]
 ) -> Float[Array, "3 M ..."]:
@@ -391,6 +395,7 @@ def rotor_velocity(
     return wake_flow(field_functions, model.modes, points, wake)
 
 
+@eqx.filter_jit
 def unit_inflow(
     model: FiniteStateModel, unit: UnitStates, x: Float[Array, "*N"], y: Float[Array, "*N"]
 ) -> Float[Array, "M ..."]:
@@ -402,6 +407,7 @@ def unit_inflow(
     return down - jnp.tensordot(unit.sources.T, ground_upflow(model, model.ground, points), 1)
 
 
+@eqx.filter_jit
 def disk_inflow(
     state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel
 ) -> Float[Array, "*N"]:

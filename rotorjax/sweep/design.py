@@ -2,7 +2,6 @@
 
 import hashlib
 import itertools
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -118,8 +117,3 @@ def grid_shape(case: SweepCase) -> tuple[int, ...]:
     if case.design.kind == "random":
         return (case.design.points,)
     return tuple(len(axis.values) for axis in case.axes)
-
-
-def count_of(case: SweepCase) -> int:
-    """How many points a sweep has."""
-    return math.prod(grid_shape(case))

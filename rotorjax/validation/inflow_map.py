@@ -34,8 +34,6 @@ from rotorjax.wake.field import velocity as wake_velocity
 
 NAME = "inflow-map"
 THRUST, ADVANCE, TILT_DEG = 0.0064, 0.15, 3.0
-REPORTED = {"collective_deg": 9.37, "theta_1c_deg": 1.11, "theta_1s_deg": -3.23}
-"""As reported: θ₀, −A₁, −B₁; for the note, since the reference radius of θ₀ is not stated."""
 DRAWN_R = np.linspace(0.2, 1.0, 33)
 SOURCE = "Elliott, Althoff & Sailey, NASA (1988)"
 SCATTER = "standard deviation within a point about 0.009, of the mean of some thousand samples far less"

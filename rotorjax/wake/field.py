@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
+from rotorjax.ground import Plane
 from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
@@ -153,27 +154,35 @@ def at_instants(
     blades = model.rotor.blades if len(angles) == 1 else 1
     of_instants = jax.tree.map(lambda a: _together(a, model.rotor.blades), turned)
 
-    def induced(points, sources, plane):
-        products = model.settings.pair_sums == "products"
-        return segment_velocity(points, *sources, plane=plane, blades=blades, products=products)
-
-    def one(operand):
-        points, sources = operand
-        if not answer:
-            found = induced(points, sources, model.ground)
-        elif model.ground is None:
-            found = jnp.zeros_like(points)
-        else:
-            found = model.ground.reflect_vectors(induced(model.ground.reflect_points(points), sources, None))
-        if model.surfaces is None:
-            return found
-        panels = model.surfaces.panels
-        through = jnp.sum(induced(panels.middles, sources, model.ground) * panels.normals, axis=1)
-        return found + model.surfaces.answer(points, through, model.ground)
+    def one(operand: tuple[Array, Segments]) -> Array:
+        return _flow(model, *operand, blades, answer)
 
     if len(places) == 1:
         return one(jax.tree.map(lambda a: a[0], (places, of_instants)))[None]
     return jax.lax.map(one, (places, of_instants))
+
+
+def _flow(
+    model: FreeWake, points: Float[Array, "N 3"], sources: Segments, blades: int, answer: bool
+) -> Float[Array, "N 3"]:
+    """Velocity at points at one instant; answer: of the images and surfaces alone."""
+
+    def induced(points: Array, plane: Plane | None) -> Array:
+        products = model.settings.pair_sums == "products"
+        return segment_velocity(points, *sources, plane=plane, blades=blades, products=products)
+
+    ground = model.ground
+    if not answer:
+        found = induced(points, ground)
+    elif ground is None:
+        found = jnp.zeros_like(points)
+    else:
+        found = ground.reflect_vectors(induced(ground.reflect_points(points), None))
+    if model.surfaces is None:
+        return found
+    panels = model.surfaces.panels
+    through = jnp.sum(induced(panels.middles, ground) * panels.normals, axis=1)
+    return found + model.surfaces.answer(points, through, ground)
 
 
 def alone(model: FreeWake) -> FreeWake:

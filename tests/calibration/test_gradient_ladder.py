@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from derivatives import both_ways
 
 from rotorjax.calibration import taught
 from rotorjax.ground import Plane, plane
@@ -433,6 +434,7 @@ STATIC = {  # numbers and tables that no one differentiates
 QUICK = {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
 
 
+@pytest.mark.slow  # all together
 @pytest.mark.parametrize("rung", RUNGS, ids=lambda rung: rung.covers[0])
 def test_ladder(rung):
     names = list(rung.points)
@@ -442,7 +444,7 @@ def test_ladder(rung):
 
     @partial(jax.jit, compiler_options=QUICK)
     def climb(points, moved):
-        return jax.vmap(flat)(moved), jax.vmap(jax.jacfwd(flat))(points), jax.vmap(jax.jacrev(flat))(points)
+        return jax.vmap(flat)(moved), *jax.vmap(both_ways(flat))(points)
 
     moved = jnp.concatenate([points[:, None], points[:, None] + moves, points[:, None] - moves], axis=1)
     count, width = points.shape

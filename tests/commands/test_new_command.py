@@ -14,8 +14,12 @@ def command(kind, folder):
     return TRY[kind].format(folder).split()[1:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["rotor", "simulate", "deck"])
-def test_what_is_written_runs_as_it_is_told(kind, tmp_path, capsys):
+def test_what_is_written_runs_as_it_is_told(kind, tmp_path, capsys, monkeypatch):
+    """With fewer looks at the deck and no pictures, which test_deck_command.py draws."""
+    monkeypatch.setattr("rotorjax.deck.run.FRAMES", 6)
+    monkeypatch.setattr("rotorjax.bench.plotting.save", lambda figure, stem: [])
     folder = tmp_path / "mine"
     assert main(["new", kind, str(folder)]) == 0
     printed = capsys.readouterr().out

@@ -3,6 +3,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from derivatives import both_ways
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
@@ -246,26 +247,24 @@ def outcome(v, tau):
     ("outcome", "v"), [(outcome, [1.1, 0.3, 0.75, 0.2, 0.9]), (printed_outcome, [1.1, 0.3, 0.4, 1.6])]
 )
 def test_derivative_ladder(outcome, v):
-    f, v, step = jax.jit(outcome), jnp.array(v), 1e-5
-    forward = jax.jit(jax.jacfwd(outcome, argnums=(0, 1)))(v, THREE_TERMS)
-    reverse = jax.jit(jax.jacrev(outcome, argnums=(0, 1)))(v, THREE_TERMS)
-    unit = np.eye(len(v))
-    by_v = np.stack([(f(v + step * e, THREE_TERMS) - f(v - step * e, THREE_TERMS)) / (2 * step) for e in unit], -1)
-    s = 1e-8
-    by_tau = np.stack([(f(v, THREE_TERMS + s * e) - f(v, THREE_TERMS - s * e)) / (2 * s) for e in np.eye(3)], -1)
-    np.testing.assert_allclose(forward[0], by_v, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(forward[1], by_tau, rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(forward[0], reverse[0], rtol=1e-11, atol=1e-14)
-    np.testing.assert_allclose(forward[1], reverse[1], rtol=1e-11, atol=1e-12)
+    count = len(v)
+    f, x = jax.jit(lambda x: outcome(x[:count], x[count:])), jnp.concatenate([jnp.array(v), THREE_TERMS])
+    forward, reverse = both_ways(f)(x)
+    steps = np.diag([1e-5] * count + [1e-8] * 3)
+    near = np.stack([(f(x + step) - f(x - step)) / (2 * step.sum()) for step in steps], -1)
+    np.testing.assert_allclose(forward[:, :count], near[:, :count], rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(forward[:, count:], near[:, count:], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(forward[:, :count], reverse[:, :count], rtol=1e-11, atol=1e-14)
+    np.testing.assert_allclose(forward[:, count:], reverse[:, count:], rtol=1e-11, atol=1e-12)
 
 
-def test_a_thousand_grounds_in_one_call():
-    heights, slopes = jnp.meshgrid(jnp.linspace(0.8, 3.0, 40), jnp.linspace(0, 0.6, 25), indexing="ij")
-    wake = jnp.broadcast_to(jnp.array([0.75, 0.2, 0.9]), (1000, 3))
+def test_many_grounds_in_one_call():
+    heights, slopes = jnp.meshgrid(jnp.linspace(0.8, 3.0, 8), jnp.linspace(0, 0.6, 5), indexing="ij")
+    wake = jnp.broadcast_to(jnp.array([0.75, 0.2, 0.9]), (40, 3))
     v = jnp.concatenate([jnp.stack([heights.ravel(), slopes.ravel()], axis=-1), wake], axis=-1)
     batch = jax.jit(jax.vmap(lambda v: outcome(v, THREE_TERMS)))(v)
-    assert batch.shape == (1000, 9)
-    for i in (0, 517, 999):
+    assert batch.shape == (40, 9)
+    for i in (0, 23, 39):
         np.testing.assert_allclose(batch[i], outcome(v[i], THREE_TERMS), rtol=1e-12)
 
 
