@@ -66,7 +66,6 @@ def linearise(
     """
     from rotorjax.linearisation.compact import reduced
     from rotorjax.linearisation.handover import handed_over
-    from rotorjax.linearisation.hover_flight import hover_in_wake
     from rotorjax.linearisation.rotor import base_of, linear_rotor
     from rotorjax.linearisation.system import linear_wake
     from rotorjax.linearisation.wake_flight import periodic_in_wake
@@ -82,12 +81,7 @@ def linearise(
     elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
         periodic, flown = linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
     elif isinstance(about, Result) and not about.request.advance:
-        if harmonics is None or tuple(harmonics) != (0,):
-            raise InputError(
-                "Argument `harmonics` must be (0,) for a hover in the free wake, which does not change with the "
-                f"azimuth, but is {harmonics}"
-            )
-        model = hover_in_wake(about, inputs, outputs, order)
+        model = _hovering(about, named(inputs), named(outputs), harmonics, order)
         return handed_over(model, about.request.rotor, about.request.operating, time)
     elif isinstance(about, Result):
         periodic, flown = periodic_in_wake(about, named(inputs), named(outputs)), about.request
@@ -102,6 +96,24 @@ def linearise(
     model = harmonic_model(periodic, tuple(harmonics))
     model = model if order is None else reduced(model, order)
     return handed_over(model, flown.rotor, flown.operating, time)
+
+
+def _hovering(
+    about: "Result",
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+    harmonics: Sequence[int] | None,
+    order: int | None,
+) -> "LinearModel":
+    """Of a hover in the free wake. Raises InputError for harmonics that it has not."""
+    from rotorjax.linearisation.hover_flight import hover_in_wake
+
+    if harmonics is None or tuple(harmonics) != (0,):
+        raise InputError(
+            "Argument `harmonics` must be (0,) for a hover in the free wake, which does not change with the azimuth, "
+            f"but is {harmonics}"
+        )
+    return hover_in_wake(about, inputs, outputs, order)
 
 
 def simulate(case: str | Path, progress: Callable[[str], None] | None = None) -> "Simulated":
