@@ -10,7 +10,9 @@ from typing import Any, Literal
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
+import optax
 from jaxtyping import Array, Float
 from scipy.optimize import least_squares, minimize
 
@@ -20,7 +22,7 @@ Residual = Callable[[Float[Array, " P"], Any], Float[Array, " N"]]
 Progress = Callable[[int, float], None]
 Method = Literal["least_squares", "lbfgs", "adam"]
 
-_ADAM_STEP, _MOMENTS, _TINY = 0.1, (0.9, 0.999), 1e-8
+_ADAM_STEP = 0.1
 _STEP_LEFT = 1e-10  # of the coordinates, where Levenberg-Marquardt stops; the verdict is taken from the Jacobian
 _NONE_LEFT = 1e-15  # of the sum of squares or its slope: as good as it gets
 
@@ -106,17 +108,15 @@ def lbfgs(descent: Descent, z: Float[np.ndarray, " P"], steps: int) -> np.ndarra
 
 
 def adam(descent: Descent, z: Float[np.ndarray, " P"], steps: int) -> np.ndarray:
-    """Adam (Kingma & Ba 2015) along a cosine schedule that ends at zero; returns the best z met."""
-    scale = descent.mean_square(z)[0] or 1.0
-    mean, square, best = np.zeros_like(z), np.zeros_like(z), (np.inf, z)
-    first, second = _MOMENTS
-    for i in range(steps):
+    """Adam along a cosine schedule that ends at zero, by optax; returns the best z met."""
+    optimiser = optax.adam(optax.cosine_decay_schedule(_ADAM_STEP, steps))
+    update, state = jax.jit(optimiser.update), optimiser.init(jnp.asarray(z))
+    scale, best = descent.mean_square(z)[0] or 1.0, (np.inf, z)
+    for _ in range(steps):
         value, slope = descent.mean_square(z)
         best = min(best, (value, z), key=lambda found: found[0])
-        mean = first * mean + (1 - first) * slope / scale
-        square = second * square + (1 - second) * (slope / scale) ** 2
-        step = mean / (1 - first ** (i + 1)) / (np.sqrt(square / (1 - second ** (i + 1))) + _TINY)
-        z = z - _ADAM_STEP * (1 + np.cos(np.pi * i / steps)) / 2 * step
+        change, state = update(slope / scale, state)
+        z = z + np.asarray(change)
         descent.note(z)
     return z if descent.mean_square(z)[0] < best[0] else best[1]
 

@@ -5,7 +5,7 @@ import os
 import platform
 import sys
 
-PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "equinox", "optimistix", "xarray", "matplotlib")
+PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "equinox", "optax", "optimistix", "xarray", "matplotlib")
 
 
 def register(commands: argparse._SubParsersAction) -> None:

@@ -20,12 +20,13 @@ def register(commands: argparse._SubParsersAction) -> None:
         "linearise",
         help="linear state-space models of the rotor about a trim, or of its free wake",
         description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
-        "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes by "
-        "name, linearise.json and report.md; several speeds or heights make a scheduled model. With --inflow freewake: "
-        "flap, lag and all states of the wake, over level ground or none; in flight periodic, condensed to a hundred "
-        "states; in hover, seen from the hub, a time-invariant model whose wake grows, and the reduced model says for "
-        "which horizon it is, in a folder of its own beside other flights. Without a thrust: the free wake of rigid "
-        "blades at a collective, in hover. Exit code 1 where a trim or the wake did not converge.",
+        "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes "
+        "by name, linearise.json, report.md and report.html; several speeds or heights make a scheduled model. "
+        "With --inflow freewake: flap, lag and all states of the wake, over level ground or none; in flight "
+        "periodic, condensed to a hundred states; in hover, seen from the hub, a time-invariant model whose wake "
+        "grows, and the reduced model says for which horizon it is, in a folder of its own beside other flights. "
+        "Without a thrust: the free wake of rigid blades at a collective, in hover. Exit code 1 where a trim or "
+        "the wake did not converge.",
     )
     add = parser.add_argument
     add_rotor(parser)
@@ -171,7 +172,7 @@ def _wake(chosen: argparse.Namespace) -> int:
     title = f"{settings.rotor.name}, collective {settings.collective_deg:g}°, {case.label}"
     content = output.write(found, title, out, chosen.time)
     print(output.lines(content))
-    print(f"written: {out / 'report.md'}")
+    print(f"written: {out / 'report.html'}")
     return 0
 
 

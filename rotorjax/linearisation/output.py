@@ -1,4 +1,4 @@
-"""What `rotorjax linearise` leaves behind: models, pictures, linearise.json and report.md."""
+"""What `rotorjax linearise` leaves behind: models, pictures, linearise.json, report.md and report.html."""
 
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 from rotorjax.bench import plotting
 from rotorjax.bench.markdown import table
 from rotorjax.io.atomic import write_json, write_text
+from rotorjax.io.page import write_page
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.handover import Time, handed_over
 from rotorjax.linearisation.marching import STEPS
@@ -38,7 +39,9 @@ def write(found: Linearised, title: str, folder: str | Path, time: Time = "secon
         plotting.save(figures.stability(found.spectrum), folder / "stability")
     content = summary(found)
     write_json(folder / "linearise.json", content)
-    write_text(folder / "report.md", report(found, title, content))
+    text = report(found, title, content)
+    write_text(folder / "report.md", text)
+    write_page(folder / "report.html", text)
     return content
 
 

@@ -1,10 +1,11 @@
-"""What `rotorjax linearise` leaves behind of a trimmed rotor: models, README, pictures, linearise.json, report.md."""
+"""What `rotorjax linearise` leaves behind of a trimmed rotor: models, README, pictures, linearise.json and a report."""
 
 from pathlib import Path
 from typing import Any
 
 from rotorjax.bench import plotting
 from rotorjax.io.atomic import write_json, write_text
+from rotorjax.io.page import write_page
 from rotorjax.linearisation import flight_output, hover_output
 from rotorjax.linearisation.compact import HIGHEST
 from rotorjax.linearisation.flight import LinearFlight
@@ -28,7 +29,9 @@ def write(found: Found, folder: Path, time: Time = "seconds") -> dict[str, Any]:
         plotting.save(figure, folder / name)
     content = summary(found) | {"time": time}
     write_json(folder / "linearise.json", content)
-    write_text(folder / "report.md", report(found))
+    text = report(found)
+    write_text(folder / "report.md", text)
+    write_page(folder / "report.html", text)
     return content
 
 

@@ -29,7 +29,7 @@ def test_it_writes_everything(tmp_path, capsys):
     assert main(["linearise", "--quick", "--height", "1", *names, "--order", "40", "--out", str(out)]) == 0
     pictures = {f"{name}.{ending}" for name in ("residuals", "bode", "steps", "stability") for ending in ("png", "pdf")}
     models = {f"{name}.{end}" for name in ("full", "reduced_frequency", "reduced_time") for end in ("nc", "mat")}
-    assert {path.name for path in out.iterdir()} == pictures | models | {"linearise.json", "report.md"}
+    assert {path.name for path in out.iterdir()} == pictures | models | {"linearise.json", "report.md", "report.html"}
     found = json.loads((out / "linearise.json").read_text())
     assert found["orbit"]["converged"]
     assert found["orbit"]["residual"] < 1e-8
@@ -54,7 +54,7 @@ def test_a_trimmed_rotor_at_one_speed_and_over_two(tmp_path, capsys):
     assert main([*line, "--speed", "0", "20", "--time", "azimuth", "--out", str(tmp_path / "two")]) == 0
     assert "coning" in capsys.readouterr().out
     files = {f"{name}.{end}" for name in ("reduced", "full", "periodic") for end in ("mat", "nc")}
-    files |= {"README.md", "report.md", "linearise.json", "roots.png", "roots.pdf"}
+    files |= {"README.md", "report.md", "report.html", "linearise.json", "roots.png", "roots.pdf"}
     assert {path.name for path in (tmp_path / "one").iterdir()} == files
     found = json.loads((tmp_path / "one" / "linearise.json").read_text())
     model = scipy.io.loadmat(tmp_path / "one" / "full.mat", simplify_cells=True)

@@ -148,7 +148,12 @@ def test_it_is_written_like_any_linear_rotor(hovered, tmp_path, monkeypatch):
     content = trim_output.write(found, tmp_path)
     files = {f"{name}.{end}" for name in ("reduced", "full") for end in ("mat", "nc")}
     files |= {f"{name}.{end}" for name in ("roots", "steps") for end in ("png", "pdf")}
-    assert {path.name for path in tmp_path.iterdir()} == files | {"README.md", "report.md", "linearise.json"}
+    assert {path.name for path in tmp_path.iterdir()} == files | {
+        "README.md",
+        "report.md",
+        "report.html",
+        "linearise.json",
+    }
     assert content["reduced_order"] == found.small.model.order == 20
     assert content["inputs"]["w"]["unit"] == "ΩR"
     assert content["reduced_step_error"]["CT"]["theta_0"] == found.small.step_error[0, 0]
