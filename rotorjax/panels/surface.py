@@ -199,6 +199,54 @@ def _checked(surfaces: Panels, ground: Plane | None) -> Panels:
     return surfaces
 
 
+def check_clear(surfaces: Panels) -> None:
+    """Raise InputError where a surface cuts the disk of a rotor at the origin, or has it inside."""
+    numbers = jax.lax.stop_gradient(surfaces)
+    if not known(numbers):
+        return
+    corners = np.asarray(numbers.corners, float)
+    cut = _least_radius(corners)
+    if np.min(cut) < 1:
+        worst = int(np.argmin(cut))
+        raise InputError(
+            f"Argument `surfaces` must keep clear of the disk, but panel {worst} comes to {cut[worst]:.3g} R from the "
+            "shaft at the height of the hub: move it away, by `.moved((dx, dy, dz))`"
+        )
+    if (around := _solid_angle(corners) / (4 * np.pi)) > 0.75:
+        raise InputError(
+            f"Argument `surfaces` must have the rotor outside, but encloses its hub ({around:.2f} of all directions "
+            "meet it from inside): move it away, by `.moved((dx, dy, dz))`"
+        )
+
+
+def _least_radius(corners: Float[np.ndarray, "P 4 3"]) -> Float[np.ndarray, " P"]:
+    """Least distance from the z axis at which each panel meets the plane z = 0; inf where it does not."""
+    here, there = corners, np.roll(corners, -1, axis=1)
+    a, b = here[..., 2], there[..., 2]
+    crosses = a * b <= 0
+    share = np.where(crosses & (a != b), a / np.where(a != b, a - b, 1.0), 0.0)
+    met = np.where(crosses[..., None], here[..., :2] + share[..., None] * (there - here)[..., :2], np.nan)
+    ends, starts = met[:, :, None], met[:, None]  # the chord between any two places where the rim crosses
+    way = ends - starts
+    length = np.sum(way**2, axis=-1)
+    along = np.clip(-np.sum(starts * way, axis=-1) / np.where(length > 0, length, 1.0), 0.0, 1.0)
+    nearest = np.linalg.norm(starts + along[..., None] * way, axis=-1).reshape(len(corners), -1)
+    return np.where(np.isnan(nearest), np.inf, nearest).min(axis=1)
+
+
+def _solid_angle(corners: Float[np.ndarray, "P 4 3"]) -> float:
+    """How much of all directions from the origin meets panels from behind, less from the front (Van Oosterom &
+    Strackee 1983, doi:10.1109/TBME.1983.325207); 4π inside a closed surface, 0 outside.
+    """
+    a, b, c, d = np.moveaxis(corners, 1, 0)
+    total = 0.0
+    for x, y, z in ((a, b, c), (a, c, d)):
+        r, s, t = (np.linalg.norm(v, axis=1) for v in (x, y, z))
+        dot = r * s * t + np.sum(x * y, 1) * t + np.sum(y * z, 1) * r + np.sum(z * x, 1) * s
+        total += float(np.sum(2 * np.arctan2(np.sum(x * np.cross(y, z), axis=1), dot)))
+    return total
+
+
 def floor(panels: Panels, ground: Plane | None) -> Plane:
     """Level plane that stands for what lies under a rotor: 1/height is the mean of 1/depth over its footprint.
 

@@ -17,11 +17,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from rotorjax.checks import array, known
+from rotorjax.checks import array, known, refuse, shown
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
-from rotorjax.panels.surface import Panels, Solid, floor, solid
+from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
 from rotorjax.rotor import geometry
 from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
@@ -189,7 +189,7 @@ def free_wake(
     be traced.
 
     Raises InputError where the rotor climbs over ground or surfaces, its solidity or tip Mach number is beyond sense,
-    azimuths is no multiple of the number of blades, or surfaces cannot be closed (`panels.surface.solid`).
+    azimuths is no multiple of the number of blades, or surfaces cut the disk or cannot be closed (`panels.surface`).
     """
     if settings is None:
         settings = hover_settings() if surfaces is None else hover_settings(**AMONG)
@@ -205,7 +205,12 @@ def free_wake(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
             f"but has {settings.azimuths}"
         )
-    closed = None if surfaces is None else solid(surfaces, ground)
+    if surfaces is None:
+        return FreeWake(rotor, operating, ground, settings, array(0.0))
+    if not isinstance(surfaces, Panels):
+        raise refuse("surfaces", "be made by rj.box, slab, wall, terrain or read_stl", shown(surfaces))
+    check_clear(surfaces)
+    closed = solid(surfaces, ground)
     return FreeWake(rotor, operating, ground, settings, array(0.0), surfaces=closed)
 
 

@@ -10,6 +10,7 @@ import pytest
 from wakes import COARSE
 
 import rotorjax as rj
+from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.panels.surface import normal_flow, solid
 from rotorjax.wake.equilibrium import displacement, look
@@ -87,3 +88,16 @@ def test_how_the_flow_changes_as_the_wall_comes_nearer(beside, flow):
     differences = (of(1e-4) - of(-1e-4)) / 2e-4
     assert abs(float(exact)) > 1e-4
     np.testing.assert_allclose(exact, differences, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "words"),
+    [
+        (rj.wall(0.5, bottom=-1.0, top=1.0, length=2.0), r"keep clear of the disk, but panel \d+ comes to 0.5 R"),
+        (rj.box((-3.0, -3.0, -0.3), (3.0, 3.0, 0.2)), "have the rotor outside, but encloses its hub"),
+        ("wall", "be made by rj.box"),
+    ],
+)
+def test_surfaces_that_no_rotor_can_turn_among_are_refused(surfaces, words):
+    with pytest.raises(InputError, match=words):
+        rj.free_wake(*rj.rotor("uh60", 18.0), None, SETTINGS, surfaces)
