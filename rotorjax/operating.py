@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.checks import Range, array, check_range
@@ -35,6 +36,10 @@ class OperatingPoint(eqx.Module):
     def tip_speed(self, radius: Float[Array, ""]) -> Float[Array, ""]:
         """ΩR in m/s, for a radius in m."""
         return self.omega * radius
+
+    def force(self, radius: Float[Array, ""]) -> Float[Array, ""]:
+        """ρA(ΩR)² in N, for a radius in m: what a force coefficient of 1 stands for."""
+        return self.density * np.pi * radius**2 * self.tip_speed(radius) ** 2
 
     def tip_mach(self, radius: Float[Array, ""]) -> Float[Array, ""]:
         """Mach number of the tip in hover, ΩR/a, for a radius in m."""

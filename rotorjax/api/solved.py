@@ -205,7 +205,7 @@ def performance(solved: Solved) -> Performance:
     """
     rotor, operating = solved.model.rotor, solved.model.operating
     tip = operating.tip_speed(rotor.radius)
-    force = operating.density * jnp.pi * rotor.radius**2 * tip**2
+    force = operating.force(rotor.radius)
     power = force * tip
     hover = solved.CT**1.5 / (jnp.sqrt(2) * solved.CP)
     return Performance(

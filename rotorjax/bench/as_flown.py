@@ -1,7 +1,5 @@
 """Weight, speed and air as users have them, beside C_T and μ: one place for trims, linear models and sweeps."""
 
-import math
-
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -34,8 +32,7 @@ def in_air(operating: OperatingPoint, altitude: float | None = None, density: fl
 def thrust_coefficient(weight: float, rotor: Rotor, operating: OperatingPoint) -> float:
     """C_T of a thrust in N along the shaft. Raises InputError where it is not positive."""
     check_range("weight", weight, WEIGHT)
-    radius, tip = float(rotor.radius), float(operating.tip_speed(rotor.radius))
-    return weight / (float(operating.density) * math.pi * radius**2 * tip**2)
+    return weight / float(operating.force(rotor.radius))
 
 
 def advance_ratio(speed: float, rotor: Rotor, operating: OperatingPoint) -> float:

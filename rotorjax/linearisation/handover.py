@@ -20,7 +20,7 @@ def handed_over(model: Model, rotor: Rotor, operating: OperatingPoint, time: Tim
     if time == "azimuth":
         return model
     omega, radius = float(operating.omega), float(rotor.radius)
-    tip, force = omega * radius, float(operating.density) * math.pi * radius**2 * (omega * radius) ** 2
+    tip, force = omega * radius, float(operating.force(rotor.radius))
     units = {
         "R": (radius, "m"),
         "ΩR": (tip, "m/s"),

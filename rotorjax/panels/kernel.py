@@ -106,6 +106,12 @@ def normal_velocities(
     return jax.lax.map(lambda one: at(*one), (points, normals), batch_size=64)
 
 
+@jax.jit
+def seen(point: Float[Array, "3"], corners: Float[Array, "P 4 3"]) -> Float[Array, ""]:
+    """Solid angle that a point sees panels under, negative from behind: −4π inside a closed surface, 0 outside it."""
+    return jnp.sum(_of_unit_density(point[:, None], frames(corners))[2])
+
+
 def _of_unit_density(points: Float[Array, "3 N"], panels: Frames) -> tuple[Array, Array, Array]:
     """4π times the velocity of each panel at each point, components (P, N) in the panel's axes."""
     x, y, z = jnp.moveaxis(panels.axes @ points - (panels.axes @ panels.origin[..., None]), 1, 0)

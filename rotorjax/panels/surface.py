@@ -23,7 +23,7 @@ from jaxtyping import ArrayLike, Float
 from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.panels.kernel import normal_velocities, panel_velocity
+from rotorjax.panels.kernel import normal_velocities, panel_velocity, seen
 
 MOST = 4000
 """Panels whose matrix is still inverted: 128 MB, some seconds."""
@@ -212,7 +212,7 @@ def check_clear(surfaces: Panels) -> None:
             f"Argument `surfaces` must keep clear of the disk, but panel {worst} comes to {cut[worst]:.3g} R from the "
             "shaft at the height of the hub: move it away, by `.moved((dx, dy, dz))`"
         )
-    if (around := _solid_angle(corners) / (4 * np.pi)) > 0.75:
+    if (around := -float(seen(jnp.zeros(3), numbers.corners)) / (4 * np.pi)) > 0.75:
         raise InputError(
             f"Argument `surfaces` must have the rotor outside, but encloses its hub ({around:.2f} of all directions "
             "meet it from inside): move it away, by `.moved((dx, dy, dz))`"
@@ -232,19 +232,6 @@ def _least_radius(corners: Float[np.ndarray, "P 4 3"]) -> Float[np.ndarray, " P"
     along = np.clip(-np.sum(starts * way, axis=-1) / np.where(length > 0, length, 1.0), 0.0, 1.0)
     nearest = np.linalg.norm(starts + along[..., None] * way, axis=-1).reshape(len(corners), -1)
     return np.where(np.isnan(nearest), np.inf, nearest).min(axis=1)
-
-
-def _solid_angle(corners: Float[np.ndarray, "P 4 3"]) -> float:
-    """How much of all directions from the origin meets panels from behind, less from the front (Van Oosterom &
-    Strackee 1983, doi:10.1109/TBME.1983.325207); 4π inside a closed surface, 0 outside.
-    """
-    a, b, c, d = np.moveaxis(corners, 1, 0)
-    total = 0.0
-    for x, y, z in ((a, b, c), (a, c, d)):
-        r, s, t = (np.linalg.norm(v, axis=1) for v in (x, y, z))
-        dot = r * s * t + np.sum(x * y, 1) * t + np.sum(y * z, 1) * r + np.sum(z * x, 1) * s
-        total += float(np.sum(2 * np.arctan2(np.sum(x * np.cross(y, z), axis=1), dot)))
-    return total
 
 
 def floor(panels: Panels, ground: Plane | None) -> Plane:

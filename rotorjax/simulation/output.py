@@ -31,7 +31,7 @@ def dataset(found: Simulated) -> xr.Dataset:
     u, x, y = flown.u, flown.x, flown.y
     degrees = {"units": "deg"}
     radius, tip = float(p.rotor.radius), float(p.operating.tip_speed(p.rotor.radius))
-    force = float(p.operating.density) * np.pi * radius**2 * tip**2
+    force = float(p.operating.force(p.rotor.radius))
     omega = float(p.operating.omega)
     data = xr.Dataset(
         coords={

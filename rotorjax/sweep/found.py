@@ -134,8 +134,7 @@ def same_numbers(one: Found, other: Found) -> bool:
 
 def dimensional(CT: float, CP: float, rotor: Any, operating: Any) -> dict[str, float]:
     """Thrust in N and power in W."""
-    tip = float(operating.tip_speed(rotor.radius))
-    force = float(operating.density) * math.pi * float(rotor.radius) ** 2 * tip**2
+    tip, force = float(operating.tip_speed(rotor.radius)), float(operating.force(rotor.radius))
     return {"thrust": force * CT, "power": force * tip * CP}
 
 

@@ -181,8 +181,9 @@ def numbers(result: Result) -> dict[str, Any]:
     request, outcome, flown = result.request, result.trimmed.outcome, result.means
     names = ("collective", "theta_1c", "theta_1s", "tilt", "beta_0", "beta_1c", "beta_1s", "lag_0")
     angles = np.rad2deg([*flown.controls, *flown.flap, flown.lag[0]])
-    tip = float(request.operating.tip_speed(request.rotor.radius))
-    force = float(request.operating.density) * np.pi * float(request.rotor.radius) ** 2 * tip**2
+    tip, force = (
+        float(scale(request.rotor.radius)) for scale in (request.operating.tip_speed, request.operating.force)
+    )
     return {
         "rotor": request.rotor.name,
         "inflow": request.inflow,

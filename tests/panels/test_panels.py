@@ -8,7 +8,7 @@ import pytest
 import rotorjax as rj
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
-from rotorjax.panels.kernel import SOFT, panel_velocity
+from rotorjax.panels.kernel import SOFT, panel_velocity, seen
 from rotorjax.panels.shapes import box, slab, terrain, wall
 from rotorjax.panels.stl import read_stl
 from rotorjax.panels.surface import Panels, floor, influence, normal_flow, refitted, solid
@@ -215,3 +215,10 @@ def test_a_new_inverse_belongs_to_new_numbers():
     here = solid(box((2, 0, 0), (3, 1, 1), 0.5))
     there = refitted(here, None)
     np.testing.assert_allclose(here.inverse, there.inverse, atol=1e-14)
+
+
+def test_a_closed_surface_is_seen_from_behind_all_round_inside_and_not_at_all_outside():
+    slab = box((-3.0, -3.0, -0.3), (3.0, 3.0, 0.2))
+    inside, outside = (float(seen(jnp.array([0.0, 0.0, z]), slab.corners)) / (4 * np.pi) for z in (0.0, 0.4))
+    assert inside == pytest.approx(-1, abs=1e-4)
+    assert outside == pytest.approx(0, abs=1e-4)
