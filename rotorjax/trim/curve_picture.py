@@ -20,7 +20,7 @@ def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure
     over_height = len({row["height"] for row in rows}) > 1
     x = np.array([row["height"] if over_height else row["advance_ratio"] for row in rows], float)
     with plotting.style():
-        figure = plotting.new_figure(9.0, 3.8)
+        figure = plotting.new_figure(9.0, 4.3)
         power, controls = figure.subplots(1, 2)
         if over_height and out_of_ground is not None:
             _in_ground_effect(power, x, rows, numbers(out_of_ground))
@@ -36,7 +36,7 @@ def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure
         controls.set(ylabel="deg")
         for axes in (power, controls):
             axes.set_xlabel("height over $R$" if over_height else "advance ratio")
-            axes.legend(loc="best", fontsize=8)
+            plotting.legend_below(axes, 2)
         power.set_title(rf"{rows[0]['rotor']}, {rows[0]['inflow']}, $C_T$ = {rows[0]['CT']:.5f}")
     return figure
 
