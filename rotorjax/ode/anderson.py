@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 from rotorjax.errors import InputError
 from rotorjax.ode.newton import LinearSolve
 from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
+from rotorjax.ode.threads import one_thread
 
 
 class _Window:
@@ -26,6 +27,7 @@ class _Window:
     def push(self, dx: np.ndarray, df: np.ndarray) -> None:
         self.dx, self.df = [*self.dx, dx][-self.size :], [*self.df, df][-self.size :]
 
+    @one_thread
     def advance(self, x: np.ndarray, f: np.ndarray, mixing: float) -> np.ndarray:
         """Next iterate: the combination of past residuals that is least, plus `mixing` of what is left of it."""
         if not self.dx:
