@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from rotorjax.errors import InputError
 from rotorjax.ode.newton import LinearSolve
-from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
+from rotorjax.ode.outcome import Log, Measure, Outcome, attainable, flat_residual, flatten, relative_rms, traceable
 from rotorjax.ode.threads import one_thread
 
 
@@ -59,8 +59,9 @@ def anderson(
     evaluates it: one program serves both. safeguard: a residual that grows to this many times the best one (or is not
     finite) goes back to the best iterate, forgets the window and halves the mixing until there is a new best.
 
-    Numbers in `args` may change from call to call without compiling again, as long as `g` is the same function.
-    A run that diverges or is interrupted returns the best iterate with `converged` False and says why.
+    In single precision `tol` is at least 1e-5. Numbers in `args` may change from call to call without compiling again,
+    as long as `g` is the same function. A run that diverges or is interrupted returns the best iterate with `converged`
+    False and says why.
 
     Raises InputError where a setting is out of range, x0 is not made of finite floating-point arrays, or `g` returns
     another structure.
@@ -80,7 +81,7 @@ def anderson(
 
     past, share = _Window(window), mixing
     x = np.asarray(flat)
-    with Log("anderson", tol, max_iterations, progress) as log:
+    with Log("anderson", attainable(tol, flat.dtype), max_iterations, progress) as log:
         f = residual(x)
         best_f = f
         done = log.note(x, measure(f, x))
