@@ -12,6 +12,11 @@ from rotorjax.ode.newton import LinearSolve
 from rotorjax.ode.outcome import Log, Measure, Outcome, attainable, flat_residual, flatten, relative_rms, traceable
 from rotorjax.ode.threads import one_thread
 
+ALIKE = 1e-3
+"""Singular value, over the largest one of unit differences, below which a combination of them is dropped: old ones grow
+parallel to each other, and what is left between them is curvature, which leads astray.
+"""
+
 
 class _Window:
     """The last differences of iterates and residuals, columns of two tall matrices."""
@@ -33,8 +38,9 @@ class _Window:
         if not self.dx:
             return x + mixing * f
         dx, df = np.stack(self.dx, axis=1), np.stack(self.df, axis=1)
-        # Old differences grow parallel to each other; lstsq drops such directions below rcond.
-        weights = np.linalg.lstsq(df, f, rcond=1e-12)[0]
+        sizes = np.linalg.norm(df, axis=0)
+        sizes[sizes == 0] = 1.0
+        weights = np.linalg.lstsq(df / sizes, f, rcond=ALIKE)[0] / sizes
         return x + mixing * f - (dx + mixing * df) @ weights
 
 

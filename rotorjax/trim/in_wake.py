@@ -3,8 +3,8 @@
 From a trim nearby the way leads straight to the case, the wake carried by what the wind changes. From nothing, in hover
 the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts from a
 prescribed one with thick cores, which thin as passes of the fixed point go on under Anderson's iteration. Where that is
-lost it starts far over the ground in an auxiliary flow down that carries the wake away, and follows the branch as the
-flow is taken back, the ground comes up and the cores thin.
+lost they thin in careful steps. Where there is none with thick cores it starts far over the ground in an auxiliary flow
+down that carries the wake away, and follows the branch as the flow is taken back and the ground comes up.
 """
 
 from collections.abc import Callable
@@ -40,23 +40,27 @@ Progress = Callable[[str, float], None]
 TOL = 1e-7
 """Relative rms of the residual of wake, blades and controls together."""
 
-ROUGH, NEAR = 1e-3, 2e-3
-"""The same on the way to the case, and at the case where to go on: from further off no search has arrived."""
-
-SHARE, WINDOW, PASSES, EASY = 0.1, 25, 100, 40
-"""Anderson's iteration on the way: the share of the residual that is added, past passes that are combined, passes after
-which a step is lost, and passes of an easy one.
+ROUGH, CLOSE, NEAR = 1e-3, 2e-4, 5e-3
+"""The same on the way to the case, quickly and carefully, and where to go on all the same: from further off no search
+has arrived.
 """
 
-LAST_WINDOW, LAST_PASSES = 100, 250
-"""The same at the case itself: with so many combined, passes converge as Newton's method does, which takes two to four
-times as many products with the Jacobian, each as dear as one or two passes.
+SHARE, WINDOW, PASSES = 0.1, 100, 250
+"""Anderson's iteration: the share of the residual that is added, how many past passes are combined, and how many are
+made at most. With so many combined, passes converge as Newton's method does, which takes two to four times as many
+products with the Jacobian, each as dear as one or two passes.
 """
 
-THICK = 4.0, 2.0, 1.4, 1.0
-"""Cores on the way in a wind, over the settings': with the thickest, vortices beside the disk do not roll up and passes
-of the fixed point converge from a prescribed wake, in slow flight and near the ground, too.
+FEW, EASY = 100, 40
+"""Passes after which a rough step is given up, and those of an easy one."""
+
+THICK = 4.0
+"""Cores at the start in a wind, over the settings': with these, vortices beside the disk do not roll up and passes of
+the fixed point converge from a prescribed wake, in slow flight and near the ground, too.
 """
+
+QUICK, CAREFUL = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1)
+"""Cores on the way, on the first one and where that is lost."""
 
 WASHOUT, FAR = 0.08, 4.0
 """Auxiliary flow (over ΩR) and height (over R) that a search begins with where it is lost without."""
@@ -178,17 +182,15 @@ class _Stages:
         """
         if z.flap.shape[0] == 1:
             return self.newton(stage, z, p, min(tol, 1e-5), hard=False)
-        if tol == ROUGH:
-            return self.passes(stage, z, p, ROUGH, WINDOW, PASSES)
-        near = self.passes(stage, z, p, tol, LAST_WINDOW, LAST_PASSES)
-        if near.converged or near.interrupted or near.residual > NEAR:
+        near = self.passes(stage, z, p, tol)
+        if near.converged or near.interrupted or tol == ROUGH or near.residual > ROUGH:
             return near
         return self.newton(stage, near.x, p, tol, hard=False)
 
-    def passes(self, stage: str, z: InWake, p: WakeTrim, tol: float, window: int, most: int) -> Outcome:
+    def passes(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
         """Passes of the fixed point under Anderson's iteration."""
-        found = anderson(passed, z, p, mixing=SHARE, window=window, tol=tol, max_iterations=most)
-        return self.done(stage, found)
+        most = FEW if tol == ROUGH else PASSES
+        return self.done(stage, anderson(passed, z, p, mixing=SHARE, window=WINDOW, tol=tol, max_iterations=most))
 
     def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float, *, hard: bool = True) -> Outcome:
         """Newton-Krylov on wake, blades and controls together. hard: try the least steps; else shorten the way."""
@@ -247,45 +249,42 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
 
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    """From a prescribed wake as cores thin to the settings' own; where that is lost, by way of an auxiliary flow."""
-    z = _prescribed(_with_cores(p, THICK[0]), controls, coning)
-    for factor in THICK:
-        thick = _with_cores(replace(p, aim="flapping"), factor)
-        z = stages.passes("thick cores", z, thick, ROUGH, WINDOW, PASSES).x
-        if stages.interrupted:
-            break
-    found = stages.found("trim", z, p, TOL)
-    if found.converged or stages.interrupted:
-        return TrimmedInWake(found.x, p, found, stages.iterations)
-    stages.nearest = found
-    return _by_way_of_washout(p, controls, coning, stages)
+    """From a wake with thick cores as these thin, quickly, and where that is lost in careful steps."""
+    thick = _with_cores(replace(p, aim="flapping"), THICK)
+    start = stages.passes("thick cores", _prescribed(thick, controls, coning), thick, ROUGH)
+    if not (start.converged or stages.interrupted):
+        start = _by_way_of_washout(thick, controls, coning, stages)
+    if not start.converged:
+        return _lost(start.x, start.why, p, stages)
+    for cores, rough in ((QUICK, ROUGH), (CAREFUL, CLOSE)):
+        found = _thinner(p, start.x, cores, rough, stages)
+        if found.converged or stages.interrupted:
+            return TrimmedInWake(found.x, p, found, stages.iterations)
+    return _lost(found.x, found.why, p, stages)
 
 
-def _by_way_of_washout(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    """Trim with thick cores in a flow that carries the wake away, far over the ground; that flow is taken back, the
-    ground comes up, and the cores go back to the settings' own.
+def _thinner(p: WakeTrim, z: InWake, cores: tuple[float, ...], rough: float, stages: _Stages) -> Outcome:
+    """The trim by passes to `rough` at each of some thicknesses of the cores, down to the settings' own."""
+    for factor in (*cores, 1.0):
+        found = stages.passes("thinner cores", z, _with_cores(replace(p, aim="flapping"), factor), rough)
+        z = found.x
+        if found.residual > NEAR:
+            return replace(found, why=f"with cores {factor:g} times as thick as asked for: {found.why}")
+    return stages.found("trim", z, p, TOL)
+
+
+def _by_way_of_washout(thick: WakeTrim, controls, coning: float, stages: _Stages) -> Outcome:
+    """Trim with thick cores in a flow that carries the wake away, far over the ground; that flow is taken back and the
+    ground comes up.
     """
-    thick = _with_cores(replace(p, aim="flapping"), THICK[0])
     washed = _washed(thick, 0.0)
-    first = stages.passes("auxiliary flow", _prescribed(washed, controls, coning), washed, ROUGH, WINDOW, PASSES)
+    first = stages.passes("auxiliary flow", _prescribed(washed, controls, coning), washed, ROUGH)
     branch = _follow("less auxiliary flow", lambda s: _washed(thick, s), first.x, 0.5, stages)
-    if branch.reached and p.model.ground is not None:
+    if branch.reached and thick.model.ground is not None:
         branch = _follow("nearer to the ground", lambda s: _lowered(thick, s), branch.last.x, 0.5, stages)
-    if not branch.reached:
-        return _lost(branch, first, p, stages)
-    branch = _thinner(p, branch.last.x, stages)
     if branch.reached:
-        return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
-    return _lost(branch, first, p, stages)
-
-
-def _thinner(p: WakeTrim, x: InWake, stages: _Stages) -> Branch:
-    """From the thickest cores to those of p, and to its aim."""
-
-    def at(s):
-        return p if s == 1 else _with_cores(p, THICK[0] ** (1 - s))
-
-    return _follow("trim", at, x, 0.5, stages)
+        return branch.last
+    return replace(branch.failed or first, converged=False, why=branch.why)
 
 
 def _follow(
@@ -304,16 +303,14 @@ def _follow(
     return continuation(step, x, 0.0, 1.0, step=first, **kept | more)
 
 
-def _lost(branch: Branch, first: Outcome, p: WakeTrim, stages: _Stages) -> TrimmedInWake:
+def _lost(x: InWake, why: str, p: WakeTrim, stages: _Stages) -> TrimmedInWake:
     """The end of a search that did not arrive: of the last wake found and the nearest one at the case itself that which
     is nearer to a trim of the case.
     """
-    x = branch.last.x if branch.outcomes else first.x
     here = anderson(passed, x, p, tol=TOL, max_iterations=0)
-    here = replace(here, converged=False, why=branch.why)
     if stages.nearest is not None and stages.nearest.residual < here.residual:
         here = stages.nearest
-    return TrimmedInWake(here.x, p, here, stages.iterations)
+    return TrimmedInWake(here.x, p, replace(here, converged=False, why=why), stages.iterations)
 
 
 def _prescribed(p: WakeTrim, controls, coning: float) -> InWake:
