@@ -1,7 +1,9 @@
 """The command line: `rotorjax COMMAND …`. Bad input is one line on stderr and exit code 2."""
 
 import argparse
+import difflib
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Sequence
@@ -86,7 +88,24 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     for given in arguments:
         if given.startswith("--") and given.endswith("=--"):  # argparse would take the value for no value at all
             top.error(f"argument {given.removesuffix('=--')}: expected a value, but it is '--'")
-    return top.parse_args(arguments)
+    chosen, unknown = top.parse_known_args(arguments)
+    if unknown:
+        _refuse_unknown(top, chosen.command, unknown[0])
+    return chosen
+
+
+def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> NoReturn:
+    """Leave for an argument that a command does not have, with the option that may have been meant."""
+    parser = commands_of(top)[command]
+    options = [option for action in parser._actions for option in action.option_strings if option.startswith("--")]
+    near = difflib.get_close_matches(given.partition("=")[0][:100], options, n=1)
+    parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
+
+
+def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of all commands, by name."""
+    (commands,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(commands.choices)
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:
@@ -155,10 +174,14 @@ def _seal_earlier(event: str, folder: Path) -> None:
 
 
 def script() -> NoReturn:
-    """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit."""
+    """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit.
+
+    A cluster whose time is up asks with SIGTERM: it counts as an interrupt, so that a march keeps what it had.
+    """
     from rotorjax.io import terminal
 
     terminal.make_safe()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     code = main()
     if code == INTERRUPTED:
         sys.stdout.flush()
