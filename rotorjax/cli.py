@@ -96,16 +96,12 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
 
 def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> NoReturn:
     """Leave for an argument that a command does not have, with the option that may have been meant."""
+    from rotorjax.commands.arguments import commands_of
+
     parser = commands_of(top)[command]
     options = [option for action in parser._actions for option in action.option_strings if option.startswith("--")]
     near = difflib.get_close_matches(given.partition("=")[0][:100], options, n=1)
     parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
-
-
-def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    """The parsers of all commands, by name."""
-    (commands,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
-    return dict(commands.choices)
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:

@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     from rotorjax.trim.run import Request
 
 
+def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of all commands, by name."""
+    (commands,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(commands.choices)
+
+
 def add_rotor(parser: argparse.ArgumentParser) -> None:
     """--rotor and --collective."""
     parser.add_argument("--rotor", default="uh60", metavar="NAME|FILE", help="catalogue name or TOML file (uh60)")

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from rotorjax.commands.arguments import commands_of
+
 
 def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
@@ -19,8 +21,6 @@ def register(commands: argparse._SubParsersAction) -> None:
 def run(chosen: argparse.Namespace) -> int:
     """Print; the exit code."""
     import shtab
-
-    from rotorjax.cli import commands_of
 
     top: argparse.ArgumentParser = chosen.program
     for each in (top, *commands_of(top).values()):
