@@ -94,6 +94,13 @@ def check_flight(model: str, thrust: float, climb: float, advance: float = 0.0) 
     return state
 
 
+def of_the_instant(advance: float, slope_deg: float) -> str | None:
+    """What to know of a level flight over a slope, which changes its height."""
+    if not advance or not slope_deg:
+        return None
+    return f"over a slope of {slope_deg:g} deg a level flight changes its height: the trim is that of the instant"
+
+
 def _unknown(model: str, state: FlightState, thrust: float, climb: float) -> str:
     hover = np.sqrt(abs(thrust) / 2)
     low, high = VORTEX_RING
