@@ -170,14 +170,12 @@ def _seal_earlier(event: str, folder: Path) -> None:
 
 
 def script() -> NoReturn:
-    """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit.
-
-    A cluster whose time is up asks with SIGTERM: it counts as an interrupt, so that a march keeps what it had.
-    """
+    """Run as a program. An interrupted one leaves at once: a thread that is still compiling would hold up the exit."""
     from rotorjax.io import terminal
 
     terminal.make_safe()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if "simulate" in sys.argv[1:2]:  # a cluster whose time is up asks with SIGTERM: a march then keeps what it had
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     code = main()
     if code == INTERRUPTED:
         sys.stdout.flush()

@@ -140,7 +140,7 @@ def test_commands_that_keep_nothing_leave_nothing_and_say_nothing_of_it(tmp_path
     assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_cluster_that_asks_to_end_interrupts(tmp_path, monkeypatch, capsys):
+def test_a_cluster_that_asks_to_end_interrupts_a_march(tmp_path, monkeypatch, capsys):
     def asked_to_end(*_, **__):
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(60.0)
@@ -148,8 +148,11 @@ def test_a_cluster_that_asks_to_end_interrupts(tmp_path, monkeypatch, capsys):
     def left(code):
         raise SystemExit(code)
 
-    monkeypatch.setattr("rotorjax.calibration.hayden_run.run", asked_to_end)
-    monkeypatch.setattr(sys, "argv", ["rotorjax", "calibrate", "hayden", "--out", str(tmp_path)])
+    place, arguments = STUBS["simulate"]
+    (tmp_path / "case.toml").write_text(FLIGHT)
+    monkeypatch.setattr(place, asked_to_end)
+    arguments = [one.format(tmp=tmp_path) for one in arguments]
+    monkeypatch.setattr(sys, "argv", ["rotorjax", "simulate", *arguments, "--out", str(tmp_path / "out")])
     monkeypatch.setattr(os, "_exit", left)
     usual = signal.getsignal(signal.SIGTERM)
     try:
@@ -157,7 +160,7 @@ def test_a_cluster_that_asks_to_end_interrupts(tmp_path, monkeypatch, capsys):
             script()
     finally:
         signal.signal(signal.SIGTERM, usual)
-    assert capsys.readouterr().err.strip().endswith("rotorjax calibrate: interrupted")
+    assert capsys.readouterr().err.strip().endswith("rotorjax simulate: interrupted")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only to root")

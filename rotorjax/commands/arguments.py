@@ -79,7 +79,7 @@ def case_of(chosen: argparse.Namespace) -> "Case":
 
 
 def introduce(rotor: "Rotor", operating: "OperatingPoint", moves: bool = False, about: Sequence[str] = ()) -> None:
-    """The rotor's derived numbers at the top of a run, and on stderr what to know of blades that move, and about more."""
+    """The rotor's derived numbers at the top of a run, and on stderr notes on blades that move, and about more."""
     from rotorjax.rotor.derived import describe, notes
 
     print(describe(rotor, operating))
