@@ -207,7 +207,7 @@ def _marcher_of_wake(case: SimulationCase, driver: Driver, start: Start, per_tur
     with precision_of(precision):
         x, u, drive, p = on_device(cast((start.x, start.inputs, driver, start.p), precision))
         first, number = begun(x, u, p, old_age), jnp.zeros(())
-        program = compiled(partial(stretch, every), first, number, number, drive, p)
+        program = compiled(partial(stretch, every), first, number, number, bound=(drive, p))
 
     def marched(stretches: int, end: float, watched: bool) -> Trajectory:
         ends = np.append(stretch_of * np.arange(stretches), end)
@@ -217,7 +217,7 @@ def _marcher_of_wake(case: SimulationCase, driver: Driver, start: Start, per_tur
         try:
             for k in tqdm(range(stretches), desc="march", disable=not watched):
                 t, dt = cast((float(ends[k]), float(ends[k + 1] - ends[k]) / every), precision)
-                state = jax.block_until_ready(program(state, t, dt, drive, p))
+                state = jax.block_until_ready(program(state, t, dt))
                 if not bool(state.finite):
                     why = f"not finite before Ω t = {ends[k + 1]:.3f}: what it had before is kept"
                     break
