@@ -25,8 +25,8 @@ from rotorjax.checks import Range, array, check_range, known, refuse, shown
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
-from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
 from rotorjax.panels.kernel import panel_velocity
+from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.dynamics import inputs_of
@@ -54,8 +54,9 @@ class SeveralWakes(eqx.Module):
 
     wakes: every array with a leading axis N. places (N, 3): hubs, over R. senses (N,): 1 counter-clockwise, −1 not.
     phases (N,): azimuth of each rotor's blade 0 as slice 0 stands there, in its own sense. coupling: share of each
-    other's flow that counts, 1 in every physical case; a search may begin below. thrusts (N,): C_T that the collectives are trimmed to, or None.
-    surfaces: in the common frame; what each rotor has of them is its floor. slices (static): K.
+    other's flow that counts, 1 in every physical case; a search may begin below. thrusts (N,): C_T that the collectives
+    are trimmed to, or None. surfaces: in the common frame; what each rotor has of them is its floor. slices (static):
+    K.
     """
 
     wakes: FreeWake

@@ -1,4 +1,4 @@
-"""Solving for several rotors in one free wake: each alone over its own floor, then all at once; where that is lost, in a
+"""Solving for several rotors in one free wake: each alone over its floor, then all at once; where that is lost, in a
 growing share of the others' flow and of the surfaces'.
 """
 
