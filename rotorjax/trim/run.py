@@ -10,12 +10,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number, closest, shown
+from rotorjax.checks import check_number, check_range, closest, shown
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
 from rotorjax.inflow.choice import NAMES, inflow_model
-from rotorjax.limits import check_flight, check_place
+from rotorjax.limits import THRUST, check_flight, check_place
 from rotorjax.operating import OperatingPoint
 from rotorjax.panels.surface import Panels
 from rotorjax.rotor import catalogue
@@ -110,7 +110,7 @@ def check(request: Request) -> None:
             f"Argument `surfaces` must be left out with the inflow '{request.inflow}': only '{FREE_WAKE}' has them"
         )
     check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
-    check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
+    check_range("thrust_coefficient", request.thrust, THRUST)
     check_flight(request.inflow, request.thrust, request.climb, request.advance)
     check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
