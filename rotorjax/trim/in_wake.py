@@ -26,12 +26,13 @@ from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import SMALLEST_STEP, newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.surface import Panels, refitted
 from rotorjax.rotor.flap_lag import blade_of, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.trim.free_wake import InWake, WakeTrim, carried, first_guess, flown, passed, residual
 from rotorjax.trim.problem import Aim
-from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.model import AMONG, FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 from rotorjax.wake.solution import solve
 
@@ -92,14 +93,17 @@ def wake_trim(
     ground: Plane | None = None,
     settings: WakeSettings | None = None,
     aim: Aim = "flapping",
+    surfaces: Panels | None = None,
 ) -> WakeTrim:
-    """Set a trim up. ground: in level axes; the trim's model has it as the tilted shaft sees it.
+    """Set a trim up. ground, surfaces: in level axes; the trim's model has them as the tilted shaft sees them.
 
     Raises InputError where the rotor has no hinge data or nothing holds its blades in lag, the disk cuts the ground, or
     as `free_wake` does.
     """
     if settings is None:
-        settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
+        cores: dict[str, Any] = {} if surfaces is None else AMONG
+        flown = windy(inputs)
+        settings = flight_settings(rotor.blades) if flown else wake_settings(azimuths=2 * rotor.blades, **cores)
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     if ground is not None and inputs.pitch is not None:
         ground = pitched(ground, inputs.pitch)
@@ -108,7 +112,9 @@ def wake_trim(
             f"Argument `ground` must lie under the disk, but the tilted disk's rim is {-float(ground.clearance):.3g} R "
             "under it: set a greater height or less tilt"
         )
-    model = free_wake(rotor, still, ground, settings)
+    if surfaces is not None and inputs.turn is not None:
+        surfaces = Panels(surfaces.corners @ inputs.turn.T)
+    model = free_wake(rotor, still, ground, settings, surfaces)
     blade = blade_of(rotor, operating)
     if not float(lag_frequency(blade)) > 0:
         raise InputError(
@@ -156,7 +162,8 @@ def trim_in_wake(
         if found.outcome.converged or stages.interrupted:
             return found
     if windy(p.inputs):
-        return _from_wind(p, controls, coning, stages)
+        way = _from_wind if p.model.surfaces is None else _among
+        return way(p, controls, coning, stages)
     return _from_hover(p, controls, coning, stages)
 
 
@@ -204,9 +211,10 @@ def _from_neighbour(p: WakeTrim, near: TrimmedInWake, stages: _Stages) -> Trimme
     """All numbers of the case go evenly from the neighbour's to its own."""
 
     def at(s: float) -> WakeTrim:
-        return (
-            p if s == 1 else jax.tree.map(lambda a, b: (1 - s) * a + s * b if eqx.is_inexact_array(b) else b, near.p, p)
-        )
+        if s == 1:
+            return p
+        between = jax.tree.map(lambda a, b: (1 - s) * a + s * b if eqx.is_inexact_array(b) else b, near.p, p)
+        return _refitted(between)
 
     def carry(z: InWake, here: float, there: float) -> InWake:
         wind = (there - here) * (near.p.inputs.velocity - p.inputs.velocity)
@@ -271,6 +279,29 @@ def _thinner(p: WakeTrim, z: InWake, cores: tuple[float, ...], rough: float, sta
         if found.residual > NEAR:
             return replace(found, why=f"with cores {factor:g} times as thick as asked for: {found.why}")
     return stages.found("trim", z, p, TOL)
+
+
+def _among(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
+    """The trim over the rotor's floor; then the surfaces at once, or as their flow comes up from nothing."""
+    open_air = replace(p, model=replace(p.model, surfaces=None, over=p.model.floor))
+    found = _from_wind(open_air, controls, coning, stages)
+    if not found.outcome.converged:
+        return replace(found, outcome=replace(found.outcome, why=f"without surfaces: {found.outcome.why}"))
+
+    def at(s: float) -> WakeTrim:
+        return eqx.tree_at(lambda q: q.model.surfaces.share, p, jnp.asarray(s, float))
+
+    branch = _follow("trim", at, found.z, 1.0, stages)
+    if not branch.reached:
+        return _lost(branch.last.x if branch.outcomes else found.z, branch.why, p, stages)
+    return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
+
+
+def _refitted(p: WakeTrim) -> WakeTrim:
+    """A trim whose surfaces have moved, with the inverse that belongs to them."""
+    if p.model.surfaces is None:
+        return p
+    return replace(p, model=replace(p.model, surfaces=refitted(p.model.surfaces, p.model.ground)))
 
 
 def _by_way_of_washout(thick: WakeTrim, controls, coning: float, stages: _Stages) -> Outcome:
