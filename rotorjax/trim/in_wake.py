@@ -91,9 +91,9 @@ def wake_trim(
     as `free_wake` does.
     """
     if settings is None:
-        cores = {} if surfaces is None else AMONG
-        flown = windy(inputs)
-        settings = flight_settings(rotor.blades) if flown else wake_settings(azimuths=2 * rotor.blades, **cores)
+        cores: dict[str, Any] = {} if surfaces is None else AMONG
+        hover = wake_settings(azimuths=2 * rotor.blades, **cores)
+        settings = flight_settings(rotor.blades) if windy(inputs) else hover
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     if ground is not None and inputs.pitch is not None:
         ground = pitched(ground, inputs.pitch)
