@@ -4,8 +4,10 @@
 
 UH-60 at C_T = 0.0058: hovering over level ground at h = 1 and at an advance ratio of 0.15 with the shaft 4 degrees
 forward, with the settings that its trims have by default. "single" is the march as `rj.march` has it: single precision,
-what closure and ground induce taken once a step; "double" the same in double precision. C is the loop of
-benchmarks/biot_savart.py, timed in turn with the right-hand sides, so that other work disturbs them alike.
+what closure and ground induce taken once a step; "double" the same in double precision. A right-hand
+side is timed as a march has it, in a loop inside its program: eight at a time, each at another state; rhs_call_ms is
+one alone, called from Python. C is the loop of benchmarks/biot_savart.py, timed in turn with the right-hand sides, so
+that other work disturbs them alike. "quick": the coarser wake of `quick_settings`, trimmed and marched in single.
 step_error: three revolutions after a collective and after a cyclic step of 1 degree, largest error of C_T and mean
 inflow (means over a revolution) and of flapping (over the largest angle), against double precision with the paper's
 filter and the steps that it needs. Compilation is not counted but in compile_s.
@@ -29,6 +31,7 @@ from rotorjax.coupled import inflow_velocity, rate_and_output
 from rotorjax.coupled_wake import CoupledWake
 from rotorjax.simulation.case import COLUMNS, SimulationCase
 from rotorjax.simulation.march import cast, compiled, march, marching, on_device, precision_of
+from rotorjax.simulation.pace import Pace
 from rotorjax.simulation.run import SAVES, fly_from
 from rotorjax.simulation.start import Start, start_of
 from rotorjax.trim.run import request
@@ -37,7 +40,7 @@ from rotorjax.wake.model import FreeWake
 from rotorjax.wake.segments import lattice_segments
 
 jax.config.update("jax_enable_x64", True)
-OMEGA, COUNT = 27.0, 4000
+OMEGA, COUNT, IN_A_ROW = 27.0, 4000, 8
 SHORT = {"single": "f32", "double": "f64"}
 TURN_S = 2 * np.pi / OMEGA
 
@@ -55,6 +58,7 @@ def case_of(flight, column=None, **options):
 
 
 FLIGHTS = {"hover": (0.0, 1.0, 0.0), "mu015": (0.15, None, 4.0)}
+QUICK = {"hover": {"panels": 12, "closure_turns": 1, "closure_bundles": 4}, "mu015": {"panels": 12}}
 
 
 def pairs(p: CoupledWake) -> int:
@@ -79,20 +83,29 @@ def steps_per_second(start: Start, turns: int, **options) -> tuple[float, float,
     return (options.get("batch") or 1) * marched.seconds / per_step, made, marched.steps_per_turn
 
 
-def against_c(library, start: Start, precision, rounds=25) -> tuple[float, float]:
-    """Milliseconds of one right-hand side, and its time over that of its pairs at C's rate: medians, in turn."""
+def against_c(library, start: Start, precision, rounds=25) -> tuple[float, float, float]:
+    """Milliseconds of one right-hand side in a loop and alone, and the first over its pairs at C's rate: medians."""
+
+    def rate(x, u, p):
+        return rate_and_output(jnp.zeros(()), x, u, p)[0]
+
+    def row(x, u, p):
+        def one(x, _):
+            return jax.tree.map(lambda v, slope: v + 1e-6 * slope, x, rate(x, u, p)), None
+
+        return jax.lax.scan(one, x, length=IN_A_ROW)[0]
+
     with precision_of(precision):
         x, u, p = on_device(cast((start.x, start.inputs, marching(start.p)), precision))
-        rate = compiled(lambda x, u, p: rate_and_output(jnp.zeros(()), x, u, p)[0], x, u, p)
-    runs = {"rhs": lambda: jax.block_until_ready(rate(x, u, p))}
+        alone, many = (compiled(function, x, bound=(u, p)) for function in (rate, row))
+    runs = {"call": lambda: jax.block_until_ready(alone(x)), "row": lambda: jax.block_until_ready(many(x))}
     if library is not None:
         dtype = np.float32 if precision == "single" else np.float64
         runs["c"] = biot_savart.c_kernel(library, biot_savart.problem(COUNT, dtype))
     found = biot_savart.measure(runs, rounds)
-    ms = 1e3 * float(np.median(found["rhs"]))
-    if library is None:
-        return ms, float("nan")
-    return ms, float(np.median(found["rhs"] / found["c"]) * COUNT**2 / pairs(start.p))
+    each = found["row"] / IN_A_ROW
+    over = float("nan") if library is None else np.median(each / found["c"]) * COUNT**2 / pairs(start.p)
+    return 1e3 * float(np.median(each)), 1e3 * float(np.median(found["call"])), float(over)
 
 
 _R, _PSI = np.linspace(0.3, 0.95, 6), np.pi / 6 * np.arange(12)
@@ -134,18 +147,31 @@ def step_errors(start: Start, flight, name: str) -> dict[str, float]:
 
 
 def long_march(start: Start, minutes: float) -> dict[str, float]:
-    """Steps by the clock at fixed inputs: late ones, and how the resident set grows."""
+    """Steps by the clock at fixed inputs, each a frame: late ones, seconds of a step, how the resident set grows."""
     marched = march(start)
-    state = marched.step(marched.start)
-    late, begun, before = 0, time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    count = int(60 * minutes / marched.seconds)
-    for k in range(count):
+    state = marched.start
+    for _ in range(marched.steps_per_turn):
         state = marched.step(state)
-        early = begun + (k + 1) * marched.seconds - time.perf_counter()
-        late += early < 0
-        time.sleep(max(0.0, early))
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    return {"long_march_minutes": minutes, "late_share": late / count, "memory_growth_mb": grown}
+    seconds = np.ones(int(60 * minutes / marched.seconds))
+    before, pace = resident_mb(), Pace(show=lambda line: None)
+    pace.start()
+    for k in range(len(seconds)):
+        begun = time.perf_counter()
+        state = marched.step(state)
+        seconds[k] = time.perf_counter() - begun
+        pace.frame((k + 1) * marched.seconds, "")
+    after = resident_mb()
+    figures = {"minutes": minutes, "frames": pace.frames, "late_frames": pace.late, "worst_late_s": pace.worst}
+    figures |= {"late_share": pace.late / pace.frames, "frame_ms": 1e3 * marched.seconds, "CT": float(state.y.CT)}
+    figures |= {f"step_ms_{q:g}": 1e3 * float(np.percentile(seconds, q)) for q in (50, 90, 99, 99.9, 100)}
+    figures |= {"over_frame_share": float(np.mean(seconds > marched.seconds))}
+    figures |= {"memory_start_mb": before, "memory_end_mb": after, "memory_growth_mb": after - before}
+    return {f"long_march_{key}": value for key, value in figures.items()}
+
+
+def resident_mb() -> float:
+    """What the process keeps in memory now (Linux)."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
 def measured(name: str, library, chosen) -> dict[str, float]:
@@ -156,9 +182,15 @@ def measured(name: str, library, chosen) -> dict[str, float]:
         factor, made, steps = steps_per_second(start, chosen.turns, precision=precision)
         figures |= {f"real_time_factor_{name}_{short}": factor, f"compile_s_{name}_{short}": made}
         figures["steps_per_turn"] = steps
-        ms, over = against_c(library, start, precision)
-        figures |= {f"rhs_ms_{name}_{short}": ms, f"rhs_over_c_{name}_{short}": over}
-    figures[f"real_time_factor_{name}_f32_two_steps"] = steps_per_second(start, chosen.turns, old_age="two steps")[0]
+        ms, call, over = against_c(library, start, precision)
+        figures |= {f"rhs_ms_{name}_{short}": ms, f"rhs_call_ms_{name}_{short}": call}
+        figures[f"rhs_over_c_{name}_{short}"] = over
+    quick = start_of(case_of(FLIGHTS[name], wake=QUICK[name]), print)
+    for key, at in (("", start), ("_quick", quick)):
+        figures[f"real_time_factor_{name}_f32{key}_two_steps"] = steps_per_second(
+            at, chosen.turns, old_age="two steps"
+        )[0]
+    figures[f"real_time_factor_{name}_f32_quick"] = steps_per_second(quick, chosen.turns)[0]
     if chosen.batch:
         figures[f"throughput_16_{name}_f32"] = steps_per_second(start, 1, batch=16)[0]
     if chosen.accuracy:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import warnings
 from pathlib import Path
 
 
@@ -46,7 +47,9 @@ def run(chosen: argparse.Namespace) -> int:
     pace = Pace(print) if chosen.real_time else None
     introduce(case.request.rotor, case.request.operating, moves=True)
     with tqdm(desc="simulate", bar_format="{desc}: {elapsed} {postfix}", leave=False, file=sys.stderr) as bar:
-        found = fly(case, bar.set_postfix_str, pace)
+        with warnings.catch_warnings():
+            warnings.showwarning = _warn
+            found = fly(case, bar.set_postfix_str, pace)
         bar.set_postfix_str("files")
         told = write_all(found, out, animated=chosen.gif)
     for name, row in told["histories"].items():
@@ -69,3 +72,10 @@ def run(chosen: argparse.Namespace) -> int:
     if not found.finished:
         print(f"the march ended early: {found.why}")
     return 0 if found.finished else 1
+
+
+def _warn(message: Warning | str, *_) -> None:
+    """Tell of a warning in a line of its own, without the place in the code that Python names."""
+    from tqdm import tqdm
+
+    tqdm.write(f"rotorjax simulate: warning: {message}", file=sys.stderr)

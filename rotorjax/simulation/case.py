@@ -50,6 +50,9 @@ from rotorjax.wake.settings import BoundFilter, wake_settings
 
 Precision = Literal["single", "double"]
 OldAge = Literal["two steps", "step", "stage"]
+MOST_A_TURN = 1440
+"""Steps of a revolution."""
+
 COLUMNS = (
     *("theta_1c_deg", "theta_1s_deg", "collective_deg"),
     *("u", "v", "w", "p_deg", "q_deg", "r_deg", "rotor_speed"),
@@ -87,7 +90,7 @@ SCHEMA: Schema = {
     "flight": _FLIGHT,
     "time": {
         "duration": Key("number", Range(1e-3, 1e5, "s"), required=True),
-        "steps_per_turn": Key("whole number", Range(24, 1440)),
+        "steps_per_turn": Key("whole number", Range(24, MOST_A_TURN)),
         "precision": Key("text", choices=get_args(Precision)),
         "old_age": Key("text", choices=get_args(OldAge)),
     },
@@ -139,7 +142,7 @@ def _build(data: Tables, folder: Path) -> SimulationCase:
     times, duration = data["time"], data["time"]["duration"]
     steps = times.get("steps_per_turn")
     if steps is not None and steps % 12:
-        raise InputError(f"[time] steps_per_turn must be a multiple of 12 from 24 to 1440, but is {steps}")
+        raise InputError(f"[time] steps_per_turn must be a multiple of 12 from 24 to {MOST_A_TURN}, but is {steps}")
     history = data.get("history", {})
     t, columns = read_history(history, COLUMNS, duration)
     if "rotor_speed" not in history:

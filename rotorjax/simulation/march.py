@@ -33,7 +33,7 @@ from rotorjax.panels.surface import Panels, check_clear, solid
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import OldAge, Precision
 from rotorjax.simulation.start import Start, from_result
-from rotorjax.simulation.step import least_steps, usual_steps
+from rotorjax.simulation.step import least_steps, stable_steps, usual_steps
 from rotorjax.trim.run import Result
 
 WIDE = {"xla_cpu_prefer_vector_width": 512} if jax.__version_info__ < (0, 11) else None
@@ -156,14 +156,26 @@ def on_device(tree: PyTree) -> PyTree:
     return jax.tree.map(lambda v: jnp.asarray(v) if _is_array(v) else v, tree)
 
 
-def compiled(function: Callable, *args: Any) -> Callable:
-    """A function's program for arguments of these shapes, static leaves bound. To be made inside `precision_of`."""
-    arrays, static = eqx.partition(args, _is_array)
-    options = WIDE if on_cpu() else None
-    program = jax.jit(lambda arrays: function(*eqx.combine(arrays, static)), compiler_options=options)
+def compiled(function: Callable, *args: Any, bound: tuple = ()) -> Callable:
+    """A function's program for arguments of these shapes, static leaves bound; `bound`: last arguments, which the
+    program keeps. To be made inside `precision_of`.
+
+    It is handed a flat list of arrays: to take a rotor and its settings apart costs as much as a tenth of a step.
+    """
+    arrays, static = eqx.partition((*args, *bound), _is_array)
+    tree, kept = jax.tree.structure(arrays), _arrays(bound)
+
+    def flat(*leaves: Array) -> Any:
+        return function(*eqx.combine(jax.tree.unflatten(tree, leaves), static))
+
     with full_products():
-        made = program.lower(arrays).compile()
-    return lambda *args: made(eqx.filter(args, _is_array))
+        lowered = jax.jit(flat, compiler_options=WIDE if on_cpu() else None).lower(*_arrays(args), *kept)
+        made = lowered.compile()
+    return lambda *args: made(*_arrays(args), *kept)
+
+
+def _arrays(tree: PyTree) -> list[Array]:
+    return [leaf for leaf in jax.tree.leaves(tree) if _is_array(leaf)]
 
 
 def stretch(
@@ -180,7 +192,8 @@ def stretch(
 @dataclass(frozen=True)
 class March:
     """A compiled march. start: state to begin with. inputs: of the trim, to be changed from step to step; in a march
-    of several, with a leading axis as the states. seconds: that a step stands for, at the nominal rotor speed.
+    of several, with a leading axis as the states. seconds: that a step stands for, at the nominal rotor speed. fastest:
+    rotor speed over that up to which the steps are enough for a free wake.
     """
 
     start: MarchState
@@ -188,20 +201,32 @@ class March:
     steps_per_turn: int
     seconds: float
     precision: Precision
+    fastest: float
     _program: Callable[[MarchState, RotorInputs], MarchState]
 
     def step(self, state: MarchState, controls: RotorInputs | None = None) -> MarchState:
         """The state after one step with controls held over it (None: the trim's). Waits for the result.
 
-        Raises FloatingPointError where it is not finite; the state that was given is the last one that is.
+        Raises FloatingPointError where it is not finite; the state that was given is the last one that is. Raises
+        InputError where the rotor is too fast for the steps, with the number that is enough.
         """
-        controls = self.inputs if controls is None else cast(controls, self.precision)
+        controls = self.inputs if controls is None else self._checked(controls)
         found = jax.block_until_ready(self._program(state, controls))
         if not np.all(found.finite):
             raise FloatingPointError(
                 f"the march left the finite numbers in step {np.max(found.steps)}: the state before it is the last"
             )
         return found
+
+    def _checked(self, controls: RotorInputs) -> RotorInputs:
+        """Controls in the march's precision, of a rotor speed that the steps can follow."""
+        if (speed := float(np.max(controls.omega))) > self.fastest:
+            steps = self.steps_per_turn
+            raise InputError(
+                f"Argument `controls` must have omega <= {self.fastest:.3g} with {steps} steps a revolution, but has "
+                f"{speed:g}: march with steps_per_turn = {int(np.ceil(steps * speed / self.fastest))}"
+            )
+        return cast(controls, self.precision)
 
 
 def marching(p: Coupled, **choices: Any) -> Coupled:
@@ -255,9 +280,10 @@ def march(
         if batch is not None:
             first, u = jax.tree.map(lambda v: jnp.broadcast_to(v, (batch, *v.shape)), (first, u))
         run = one if batch is None else _several(one)
-        program = compiled(run, first, u, p)
+        program = compiled(run, first, u, bound=(p,))
     seconds = angle / float(start.p.operating.omega)
-    return March(first, u, steps, seconds, precision, lambda state, controls: program(state, controls, p))
+    needed = stable_steps(start)
+    return March(first, u, steps, seconds, precision, steps / needed if needed else np.inf, program)
 
 
 def _past(start: Start, surfaces: Panels) -> Start:

@@ -21,13 +21,13 @@ from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import ATTITUDE, RotorInputs
-from rotorjax.simulation.case import OldAge, Precision, SimulationCase, steps_of
+from rotorjax.simulation.case import MOST_A_TURN, OldAge, Precision, SimulationCase, steps_of
 from rotorjax.simulation.history import Piecewise, piecewise
 from rotorjax.simulation.march import MarchState, begun, cast, compiled, on_device, precision_of, stretch
 from rotorjax.simulation.pace import Pace
 from rotorjax.simulation.path import Above, angles, hub_path
 from rotorjax.simulation.start import Start, start_of
-from rotorjax.simulation.step import instant, steps_per_turn
+from rotorjax.simulation.step import check_steps, instant, steps_per_turn
 
 SAVES = 12  # of a revolution
 Progress = Callable[[str], None]
@@ -122,7 +122,8 @@ def fly(case: SimulationCase, progress: Progress | None = None, pace: Pace | Non
     """
     report = progress or (lambda stage: None)
     request = case.request
-    if request.height is not None and request.drag_area is None:  # said before the trim's work
+    check_steps(case)  # these are said before the trim's work
+    if request.height is not None and request.drag_area is None:
         path_of(case, request.rotor, request.operating, float(np.deg2rad(request.tilt_deg)))
     report("trim")
     return fly_from(case, start_of(case, report), report, pace)
@@ -140,7 +141,7 @@ def fly_from(
     omega = float(p.operating.omega)
     per_turn = steps_per_turn(case, start)
     steps = steps_of(case, omega, per_turn)
-    check_histories(case, 2 * np.pi / per_turn / omega)
+    check_histories(case, omega, per_turn)
     report("compile the march")
     make = _marcher_of_wake if isinstance(p, CoupledWake) else _marcher
     marched = make(case, driver, start, per_turn, pace)
@@ -154,18 +155,23 @@ def fly_from(
     return Simulated(case, start, Flown(found.t, found.x, u, y), driver, steps, spent, found.finished, found.why, pace)
 
 
-def check_histories(case: SimulationCase, step: float) -> None:
-    """Warn where points of a history stand closer than the steps (s), and say what they are taken for."""
+def check_histories(case: SimulationCase, omega: float, per_turn: int) -> None:
+    """Warn where points of a history stand closer than the steps, and say what they are taken for and what would do.
+
+    omega: rotor speed (rad/s). per_turn: steps of a revolution.
+    """
+    turn = 2 * np.pi / omega
+    step = turn / per_turn
     moving = np.any(np.diff(case.columns, axis=0) != 0, axis=1)
     gaps = np.diff(case.t)[moving]
-    if not gaps.size or gaps.min() >= step:
+    if not gaps.size or gaps.min() >= step * (1 - 1e-9):
         return
     k = int(np.flatnonzero(moving)[np.argmin(gaps)])
-    most = 0.5 / step
+    most, enough = 0.5 / step, 12 * int(np.ceil(turn / gaps.min() / 12 - 1e-9))
+    way = f"raise steps_per_turn in [time] to {enough}" if enough <= MOST_A_TURN else "spread the change"
     warnings.warn(
         f"[history] changes between t = {case.t[k]:g} and {case.t[k + 1]:g} s, in less than a step of {step:.3g} s: "
-        f"what is faster than {most:.3g} Hz is taken for something slower (f for |f - {2 * most:.3g}|): "
-        "raise steps_per_turn in [time]",
+        f"what is faster than {most:.3g} Hz is taken for something slower (f for |f - {2 * most:.3g}|): {way}",
         stacklevel=3,
     )
 
@@ -207,7 +213,7 @@ def _marcher_of_wake(case: SimulationCase, driver: Driver, start: Start, per_tur
     with precision_of(precision):
         x, u, drive, p = on_device(cast((start.x, start.inputs, driver, start.p), precision))
         first, number = begun(x, u, p, old_age), jnp.zeros(())
-        program = compiled(partial(stretch, every), first, number, number, drive, p)
+        program = compiled(partial(stretch, every), first, number, number, bound=(drive, p))
 
     def marched(stretches: int, end: float, watched: bool) -> Trajectory:
         ends = np.append(stretch_of * np.arange(stretches), end)
@@ -217,7 +223,7 @@ def _marcher_of_wake(case: SimulationCase, driver: Driver, start: Start, per_tur
         try:
             for k in tqdm(range(stretches), desc="march", disable=not watched):
                 t, dt = cast((float(ends[k]), float(ends[k + 1] - ends[k]) / every), precision)
-                state = jax.block_until_ready(program(state, t, dt, drive, p))
+                state = jax.block_until_ready(program(state, t, dt))
                 if not bool(state.finite):
                     why = f"not finite before Ω t = {ends[k + 1]:.3f}: what it had before is kept"
                     break

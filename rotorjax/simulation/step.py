@@ -11,13 +11,17 @@ from rotorjax.coupled_wake import CoupledWake
 from rotorjax.device import cpu
 from rotorjax.errors import InputError
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.simulation.case import SimulationCase
-from rotorjax.simulation.start import Start
+from rotorjax.simulation.case import COLUMNS, SimulationCase
+from rotorjax.simulation.start import Start, settings_of
+from rotorjax.trim.run import FREE_WAKE
+from rotorjax.wake.settings import WakeSettings
 
 USUAL = 120
 """Steps of a revolution without a free wake."""
 STABLE = 2.75
 """|λ|Δψ of the fastest decay; the classical Runge-Kutta method holds 2.785 on the negative real axis."""
+AGES = 1.04
+"""Age steps that the transport may go in a step; 5PBU4 with that method holds 1.044."""
 
 
 @eqx.filter_jit
@@ -31,29 +35,66 @@ def steps_per_turn(case: SimulationCase, start: Start) -> int:
 
     Raises InputError where the case's are too few for its free wake, whose march would leave the finite numbers.
     """
+    if case.steps_per_turn is None:
+        return usual_steps(start, _fastest(case))
+    _check(case, least_steps(start, _fastest(case)))
+    return case.steps_per_turn
+
+
+def check_steps(case: SimulationCase) -> None:
+    """Raise InputError, before the trim's work, where a case's steps are too few for the ages of its free wake."""
+    if case.steps_per_turn is not None and case.request.inflow == FREE_WAKE:
+        _check(case, _twelfths(_of_ages(settings_of(case)) * _fastest(case)))
+
+
+def _fastest(case: SimulationCase) -> float:
+    """Highest rotor speed of a case over the nominal one; a lower one never asks for fewer steps."""
+    return max(1.0, float(case.columns[:, COLUMNS.index("rotor_speed")].max()) / 100)
+
+
+def _check(case: SimulationCase, least: int) -> None:
     wanted = case.steps_per_turn
-    if wanted is None:
-        return usual_steps(start)
-    if wanted < (least := least_steps(start)):
-        raise InputError(f"[time] steps_per_turn must be at least {least} for this wake, but is {wanted}: leave it out")
-    return wanted
+    if wanted is not None and wanted < least:
+        at = "" if (speed := _fastest(case)) == 1 else f" at {100 * speed:g} per cent of the rotor speed"
+        raise InputError(
+            f"[time] steps_per_turn must be at least {least} for this wake{at}, but is {wanted}: leave it out"
+        )
 
 
-def usual_steps(start: Start) -> int:
-    """Steps of a revolution where nobody asks for a number: a multiple of twelve."""
-    return max(24, least_steps(start)) if isinstance(start.p, CoupledWake) else USUAL
+def usual_steps(start: Start, speed: float = 1.0) -> int:
+    """Steps of a revolution where nobody asks for a number: a multiple of twelve. speed: as in `least_steps`."""
+    return max(24, least_steps(start, speed)) if isinstance(start.p, CoupledWake) else USUAL
 
 
-def least_steps(start: Start) -> int:
+def least_steps(start: Start, speed: float = 1.0) -> int:
     """Least steps of a revolution with which a free wake can be marched, a multiple of twelve; 1 without one.
 
-    Its transport along age allows one age step (5PBU4 with the classical Runge-Kutta method: 1.044), a bound
-    circulation that follows passes STABLE over its fastest decay; that of the solution's filter is taken exactly.
+    speed: the highest of the rotor over the nominal one, of whose revolution the steps are.
+    """
+    return max(1, _twelfths(stable_steps(start) * speed))
+
+
+def stable_steps(start: Start) -> float:
+    """Steps of a revolution with which the march of a free wake is just stable; 0 without one.
+
+    Its transport along age allows AGES, a bound circulation that follows passes STABLE over its fastest decay; that of
+    the solution's filter is taken exactly.
     """
     if not isinstance(start.p, CoupledWake):
-        return 1
-    decay = fastest_decay(start.x, start.inputs, start.p) if start.p.settings.bound_filter == "pass" else 0.0
-    return 12 * int(np.ceil(max(2 * np.pi * decay / STABLE, start.p.settings.steps_per_turn) / 12 - 1e-9))
+        return 0.0
+    of_ages = _of_ages(start.p.settings)
+    if start.p.settings.bound_filter == "solution":
+        return of_ages
+    return max(of_ages, 2 * np.pi * fastest_decay(start.x, start.inputs, start.p) / STABLE)
+
+
+def _of_ages(settings: WakeSettings) -> float:
+    return settings.steps_per_turn / AGES
+
+
+def _twelfths(steps: float) -> int:
+    """The multiple of twelve that is enough."""
+    return 12 * int(np.ceil(steps / 12 - 1e-9))
 
 
 def fastest_decay(x: CoupledState, u: RotorInputs, p: CoupledWake, rounds: int = 24) -> float:

@@ -23,7 +23,7 @@ from rotorjax.device import on_cpu
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
-from rotorjax.wake.kernel_pairs import cross, dot, influence, loose_pairs, nonzero
+from rotorjax.wake.kernel_pairs import between, cross, dot, influence, nonzero, subtract
 from rotorjax.wake.kernel_rule import BiotSavart
 from rotorjax.wake.kernel_sweeps import Segments, Settings
 
@@ -151,22 +151,28 @@ def sharpened_velocity(
     difference of two nearly equal numbers is not taken: 1/(h + e₁) − 1/(h + e₂) = (e₂ − e₁)/((h + e₁)(h + e₂)).
     """
     length = jnp.sum((end - start) ** 2, axis=1)
-    pair = loose_pairs(tuple(points.T), tuple(start.T), tuple(end.T), length * core**2)
-    thin = (length * fine**2)[:, None]
+    thin, pair = length * fine**2, _stored(points, start, end, length * core**2)
     c = cross(pair.edge, pair.r1)
     sharper = influence(pair, 1) * (pair.soft - thin) / nonzero(dot(c, c) + thin)
-    weight = strength[:, None] / (4 * jnp.pi) * sharper
-    return jnp.sum(weight * jnp.stack(c), axis=1).T
+    weight = strength / (4 * jnp.pi) * sharper
+    return jnp.stack([jnp.sum(weight * component, axis=1) for component in c], axis=1)
 
 
 def unit_velocities(
     points: Float[Array, "N 3"], start: Float[Array, "S 3"], end: Float[Array, "S 3"], core: Float[Array, ""]
 ) -> Float[Array, "N S 3"]:
     """Velocity at each point from each segment of unit strength (Scully's core), all pairs stored: for few of them."""
-    length = jnp.sum((end - start) ** 2, axis=1)
-    pair = loose_pairs(tuple(points.T), tuple(start.T), tuple(end.T), length * core**2)
+    pair = _stored(points, start, end, jnp.sum((end - start) ** 2, axis=1) * core**2)
     found = jnp.stack(cross(pair.edge, pair.r1)) * influence(pair, 1) / (4 * jnp.pi)
-    return jnp.transpose(found, (2, 1, 0))
+    return jnp.moveaxis(found, 0, -1)
+
+
+def _stored(
+    points: Float[Array, "N 3"], start: Float[Array, "S 3"], end: Float[Array, "S 3"], soft: Float[Array, " S"]
+):
+    """All N × S pairs, segments along the vector lanes: a blade has more of them than control points."""
+    r1, r2 = (subtract(tuple(points.T[:, :, None]), tuple(ends.T)) for ends in (start, end))
+    return between(r1, r2, tuple((end - start).T), soft)
 
 
 def _settings(exponent: float, blades: int, block: int | None, chained: bool) -> Settings:

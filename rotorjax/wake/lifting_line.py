@@ -59,13 +59,14 @@ def own_ring(model: FreeWake, state: WakeState) -> Float[Array, "K R R 3"]:
     carries half of it (`segments.near_lattice`). The bound vortex, straight, induces nothing on its own line.
     """
     fine = model.settings.control_core
-    difference = -np.diff(np.pad(np.eye(model.settings.panels), ((1, 1), (0, 0))), axis=0)  # trailers of each panel
+    panels = np.eye(model.settings.panels)
+    # circulation of the first ring's trailers, then of its shed edge, for that of each panel
+    of_panels = 0.5 * np.concatenate([-np.diff(np.pad(panels, ((1, 1), (0, 0))), axis=0), -panels])
 
     def one(k, first):
         own = model.of_slice(k)
-        trailed = unit_velocities(own.control, own.leading, first, fine)
-        shed = unit_velocities(own.control, first[:-1], first[1:], fine)
-        return 0.5 * (jnp.einsum("isc,sj->ijc", trailed, difference) - shed)
+        start, end = jnp.concatenate([own.leading, first[:-1]]), jnp.concatenate([first, first[1:]])
+        return jnp.einsum("isc,sj->ijc", unit_velocities(own.control, start, end, fine), of_panels)
 
     return jax.vmap(one)(jnp.arange(len(state.near)), state.near[:, :, 0])
 

@@ -76,6 +76,8 @@ def test_single_precision(start, fine):
     assert {leaf.dtype for leaf in jax.tree.leaves(state.x)} == {np.dtype(np.float32)}
     assert float(state.y.CT) == pytest.approx(float(double.y.CT), rel=1e-4)
     assert off(state, double) < 1e-4
+    with pytest.raises(InputError, match=r"omega <= 4.16 with 48 .*, but has 5: .* steps_per_turn = 58"):
+        single.step(state, replace(single.inputs, omega=5.0))
     with pytest.raises(FloatingPointError, match="in step 17"):
         single.step(state, replace(single.inputs, theta_0=np.nan))
 
@@ -115,9 +117,12 @@ def test_a_history_faster_than_the_steps_is_warned_of(level):
     t, columns = np.array([0.0, 0.1, 0.104, 1.0]), np.zeros((4, len(COLUMNS)))
     columns[2:, 2] = 1.0
     case = SimulationCase(level.request, 1.0, None, t, columns)
-    with pytest.warns(UserWarning, match=r"between t = 0.1 and 0.104 s, in less than a step of 0.01 s: .* 50 Hz"):
-        check_histories(case, 0.01)
-    check_histories(case, 0.0039)
+    omega = 2 * np.pi / 0.24
+    with pytest.warns(
+        UserWarning, match=r"between t = 0.1 and 0.104 s, in less than a step of 0.01 s: .* 50 Hz .* to 60"
+    ):
+        check_histories(case, omega, 24)
+    check_histories(case, omega, 60)
 
 
 def test_late_frames_are_counted():

@@ -188,5 +188,11 @@ def test_what_is_wrong_is_said_before_the_trim(tmp_path):
     sinking = read_case(write(tmp_path, OVER_GROUND, TIME, HISTORY, "w = [0.0, 90.0]\n"))
     with pytest.raises(InputError, match=r"rim over R\), but cuts it at 0\.\d\d s"):
         fly(sinking, no_trim)
+    coarse = read_case(write(tmp_path, FLIGHT, TIME, "steps_per_turn = 24\n[wake]\nage_step_deg = 10.0\n"))
+    with pytest.raises(InputError, match="steps_per_turn must be at least 36 for this wake, but is 24"):
+        fly(coarse, no_trim)
+    fast = "steps_per_turn = 24\n[history]\nt = [0.0, 0.3]\nrotor_speed = [100.0, 120.0]\n"
+    with pytest.raises(InputError, match="at least 36 for this wake at 120 per cent of the rotor speed, but is 24"):
+        fly(read_case(write(tmp_path, FLIGHT, TIME, fast)), no_trim)
     with pytest.raises(InputError, match=r"\[wake\] panels must be a whole number from 4"):
         read_case(write(tmp_path, FLIGHT, TIME, "[wake]\npanels = 2\n"))
