@@ -102,8 +102,8 @@ def wake_trim(
     """
     if settings is None:
         cores: dict[str, Any] = {} if surfaces is None else AMONG
-        flown = windy(inputs)
-        settings = flight_settings(rotor.blades) if flown else wake_settings(azimuths=2 * rotor.blades, **cores)
+        hover = wake_settings(azimuths=2 * rotor.blades, **cores)
+        settings = flight_settings(rotor.blades) if windy(inputs) else hover
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     if ground is not None and inputs.pitch is not None:
         ground = pitched(ground, inputs.pitch)

@@ -297,9 +297,9 @@ def answer(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
 
 def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
     """Source densities of the panels over ΩR at each instant, against the flow of all wakes and their images."""
-    surfaces, instants = several.surfaces, several.slices // several.wakes.rotor.blades
+    surfaces = several.surfaces
     assert surfaces is not None
-    panels = surfaces.panels
+    panels, instants = surfaces.panels, several.slices // several.wakes.rotor.blades
 
     def through(one: tuple[FreeWake, Segments, Array, Array, Array]) -> Array:
         model, sources, place, sense, angles = one
