@@ -11,6 +11,7 @@ frame: x outboard along the blade, y in the direction of rotation, z up. One lay
 """
 
 from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -27,7 +28,7 @@ from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, hover_settings
 
-AMONG = {"tip_core": 0.05}
+AMONG: dict[str, Any] = {"tip_core": 0.05}
 """Settings of a wake among surfaces beyond those of hover: where turns are not round, thin old vortices wind round each
 other and the search stalls, as in flight."""
 

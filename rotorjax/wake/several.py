@@ -297,8 +297,9 @@ def answer(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
 
 def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
     """Source densities of the panels over ΩR at each instant, against the flow of all wakes and their images."""
-    assert several.surfaces is not None
-    panels, instants = several.surfaces.panels, several.slices // several.wakes.rotor.blades
+    surfaces, instants = several.surfaces, several.slices // several.wakes.rotor.blades
+    assert surfaces is not None
+    panels = surfaces.panels
 
     def through(one: tuple[FreeWake, Segments, Array, Array, Array]) -> Array:
         model, sources, place, sense, angles = one
@@ -307,7 +308,7 @@ def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
 
     each = (several.wakes, segments, several.places, several.senses, several.angles)
     blown = jnp.sum(jax.lax.map(through, each), axis=0)
-    return jax.lax.map(lambda one: several.surfaces.densities(one, several.ground), blown)
+    return jax.lax.map(lambda one: surfaces.densities(one, several.ground), blown)
 
 
 def told(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation]:
