@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.ode.anderson import anderson
+from rotorjax.ode.anderson import _Window, anderson
 from rotorjax.ode.linear import Dense, Krylov
 
 RNG = np.random.default_rng(1)
@@ -107,3 +107,11 @@ def test_a_residual_for_newton_gives_the_same_iterates(linear):
     other = anderson(difference, {"x": jnp.zeros(40)}, SPREAD, b, mixing=0.3, tol=1e-10, linear=linear)
     assert one.converged
     np.testing.assert_allclose(one.residuals, other.residuals, rtol=1e-6, atol=1e-12)
+
+
+def test_differences_that_hardly_disagree_do_not_throw_the_iterate():
+    """What is left between two parallel ones is curvature: solved for, it makes a step of 10⁴."""
+    past = _Window(5)
+    for change in ([-1.0, 0.0], [-1.0, 1e-4]):
+        past.push(np.array([1.0, 0.0]), np.array(change))
+    np.testing.assert_allclose(past.advance(np.zeros(2), np.array([0.0, 1.0]), 0.1), [0.0, 0.1], atol=1e-3)
