@@ -7,10 +7,10 @@ Flights: the UH-60 and Elliott and Althoff's rotor, advance ratio 0 … 0.35, he
 shaft −2° … 6° forward. Hovers, with rigid blades: every rotor of the catalogue, height 0.4 … 3 R, slope to 40° or to a
 clearance of 0.05 R, collective for 3 % … 120 % of the design thrust C_T/σ = 0.08. Known: flights that once stalled.
 Case i of a seed is the same whatever n is. --jobs shares the cases among processes with cores of their own, which give
-each other compiled programs where JAX_COMPILATION_CACHE_DIR is set; the file is written anew after every case, and a
-run that is ended (SIGTERM, Ctrl-C) sums up what it has. Prints the share that converged, median and 95 % of the seconds
-after compilation (tracing counts as solving), those of the processor, and each failure: where it ended, with what
-residual, and how good its loads are all the same.
+each other compiled programs where JAX_COMPILATION_CACHE_DIR is set; the file is written anew after every case, a run
+that is ended (SIGTERM, Ctrl-C, --until) sums up what it has, and the same command goes on where the file ends. Prints
+the share that converged, median and 95 % of the seconds after compilation (tracing counts as solving), those of the
+processor, and each failure: where it ended, with what residual, and how good its loads are all the same.
 """
 
 import argparse
@@ -156,9 +156,10 @@ def row_of(part: str, i: int, seed: int, quick: bool, progress: Any = None) -> d
     return row | {"busy_s": time.process_time() - busy, "load_average": os.getloadavg()[0]}
 
 
-def solved_cases(pool: Pool, chosen: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """Rows as they come; no case is begun after `until` seconds."""
-    begun, waiting, running = time.perf_counter(), cases_of(chosen), 0
+def solved_cases(pool: Pool, chosen: argparse.Namespace, done: set) -> Iterator[dict[str, Any]]:
+    """Rows of the cases that are not `done` (part, number) as they come; none is begun after `until` seconds."""
+    begun, running = time.perf_counter(), 0
+    waiting = [case for case in cases_of(chosen) if case not in done]
     with tqdm(total=len(waiting), file=sys.stderr, disable=not sys.stderr.isatty()) as bar:
         while True:
             while waiting and running < pool.size and time.perf_counter() - begun < chosen.until:
@@ -172,7 +173,16 @@ def solved_cases(pool: Pool, chosen: argparse.Namespace) -> Iterator[dict[str, A
                 yield row
 
 
-def kept(rows: list[dict[str, Any]], chosen: argparse.Namespace) -> None:
+def kept_before(chosen: argparse.Namespace) -> list[dict[str, Any]]:
+    """Rows of the file, where there is one of the same seed and settings."""
+    file = Path(chosen.json) if chosen.json else None
+    if file is None or not file.exists():
+        return []
+    found = json.loads(file.read_text())
+    return found["rows"] if (found["seed"], found["quick"]) == (chosen.seed, chosen.quick) else []
+
+
+def keep(rows: list[dict[str, Any]], chosen: argparse.Namespace) -> None:
     """Write what there is, all or nothing."""
     file = Path(chosen.json)
     written = file.with_name(f"{file.name}.new")
@@ -201,11 +211,11 @@ def summary(part: str, rows: list[dict[str, Any]]) -> str:
     if not here:
         return f"{part}: none"
     good = [row for row in here if row["converged"]]
-    seconds = [row["solve_s"] for row in here]
+    seconds, busy = ([row[key] for row in here] for key in ("solve_s", "busy_s"))
     said = (
         f"{part}: {len(good)} of {len(here)} converged ({100 * len(good) / len(here):.1f} %); "
         f"median {np.median(seconds):.1f} s, 95 % {np.percentile(seconds, 95):.1f} s, most {max(seconds):.1f} s; "
-        f"of the processor, compiling included, median {np.median([row['busy_s'] for row in here]):.1f} s; "
+        f"of the processor, compiling included, median {np.median(busy):.1f} s, 95 % {np.percentile(busy, 95):.1f} s; "
         f"mean load {np.mean([row['load_average'] for row in here]):.1f} on {os.cpu_count()} cores"
     )
     return "\n".join([said, *(f"  {line(row)}" for row in here if not row["converged"])])
@@ -227,13 +237,13 @@ def main() -> None:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     as_seen_by_workers()
     pool = Here() if chosen.jobs == 1 else Pinned(chosen.jobs)
-    rows: list[dict[str, Any]] = []
+    rows = kept_before(chosen)
     try:
-        for row in solved_cases(pool, chosen):
+        for row in solved_cases(pool, chosen, {(row["part"], row["case"]) for row in rows}):
             rows.append(row)
             print(line(row), flush=True)
             if chosen.json:
-                kept(rows, chosen)
+                keep(rows, chosen)
     except KeyboardInterrupt:
         print("ended before the last case was solved")
     finally:

@@ -2,13 +2,16 @@
 
 Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
 theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
-the edge of a roof a radius below it), hangar (one beside a wall at 1.2 R). Knight and Hefner's two-bladed rotor at 8°
-with a wake that keeps all of it to minutes: three free turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
+the edge of a roof a radius below it), hangar (one beside a wall at 1.2 R), wind (a UH-60 trimmed in a wind of 0.1 ΩR
+over the edge of a roof), passing (one that flies over a roof at that speed, marched). The last two have small wakes
+(`TINY`), the others Knight and Hefner's two-bladed rotor at 8° with a wake that keeps all of it to minutes: three free
+turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
 """
 
 import argparse
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import equinox as eqx
@@ -29,6 +32,7 @@ from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.field import at_instants, velocity, wake_segments
 from rotorjax.wake.model import azimuths
 from rotorjax.wake.sensitivity import periodic_wake
+from rotorjax.wake.settings import flight_settings
 from rotorjax.wake.solution import readings
 
 jax.config.update("jax_enable_x64", True)
@@ -289,7 +293,70 @@ def draw_hangar(solved, path: Path) -> None:
     save_file(figure, path)
 
 
-PARTS = ("limits", "derivative", "cost", "roof", "hangar")
+TINY = {"panels": 6, "age_step_deg": 30.0, "near_wake_deg": 120.0, "closure_turns": 1, "closure_bundles": 0}
+SPEED, STEPS = 0.1, 24
+
+
+def flown(**more):
+    settings = flight_settings(4, **TINY, azimuths=8)
+    return rj.trim(*rj.rotor("uh60"), 0.0058, inflow="freewake", advance=SPEED, wake=settings, **more)
+
+
+def wind(quick: bool) -> list[dict]:
+    """Controls with the hub still in a wind along x, without a roof and over the edge of one, which it blows around."""
+    rows = []
+    roof = rj.slab((-3.0, -2.0), (0.5, 2.0), -HEIGHT, thickness=0.6, panel=0.7)
+    for name, surfaces in (("open", None), ("roof", roof)):
+        began, busy = time.perf_counter(), time.process_time()
+        found = flown(surfaces=surfaces)
+        row = {"of": name, "converged": found.converged, "why": found.trimmed.outcome.why, "CT": float(found.means.CT)}
+        row |= {"controls_deg": np.rad2deg(found.trimmed.z.controls).tolist()}
+        row |= {"seconds": time.perf_counter() - began, "processor": time.process_time() - busy}
+        print(json.dumps({"wind": row}), flush=True)
+        rows.append(row)
+    return rows
+
+
+def passing(quick: bool) -> dict:
+    """C_T and hub moments over the place of the hub, controls held, as it flies in still air over a roof 4 R long."""
+    roof = rj.slab((-6.0, -2.0), (-2.0, 2.0), -0.6, thickness=0.6, panel=0.7)
+    trimmed = flown()
+    rows = {}
+    for name, surfaces in (("open", None), ("roof", roof)):
+        march = rj.march(trimmed, STEPS, surfaces=surfaces)
+        state, controls, found = march.start, march.inputs, []
+        began, busy = time.perf_counter(), time.process_time()
+        for k in range((5 if quick else 12) * STEPS):
+            x = -SPEED * 2 * np.pi / STEPS * k
+            if surfaces is not None:
+                controls = replace(controls, place=np.array([x, 0.0, 0.0]))
+            state = march.step(state, controls)
+            found.append((x, float(state.y.CT), float(state.y.moment[0]), float(state.y.moment[1])))
+        rows[name] = found
+        spent = {"seconds": time.perf_counter() - began, "processor": time.process_time() - busy, "steps": len(found)}
+        print(json.dumps({"passing": name, "mean_CT": float(np.mean([row[1] for row in found])), **spent}), flush=True)
+    return rows
+
+
+def draw_passing(rows: dict, path: Path) -> None:
+    """Means over a revolution, with and without the roof."""
+    with style():
+        figure = new_figure(10.0, 3.8)
+        for k, (column, label) in enumerate(
+            ((1, "$C_T$"), (2, "hub moment about x, aft"), (3, "hub moment about y, to starboard"))
+        ):
+            axes = figure.add_subplot(1, 3, k + 1)
+            for name, colour in (("roof", FREE_WAKE), ("open", "#888888")):
+                found = np.array(rows[name])
+                mean = np.convolve(found[:, column], np.full(STEPS, 1 / STEPS), mode="valid")
+                axes.plot(-found[STEPS // 2 : STEPS // 2 + len(mean), 0], mean, color=colour, label=name)
+            axes.axvspan(2.0, 6.0, color="#7a5c3e", alpha=0.15)
+            axes.set(xlabel="way flown, over R", ylabel=label)
+            legend_below(axes, 2)
+    save_file(figure, path)
+
+
+PARTS = ("limits", "derivative", "cost", "roof", "hangar", "wind", "passing")
 
 
 def main() -> None:
@@ -304,6 +371,9 @@ def main() -> None:
         found[part] = globals()[part](chosen.quick)
         if part == "hangar":
             found[part], solved = found[part]
+        if chosen.out is not None and part == "passing":
+            chosen.out.mkdir(parents=True, exist_ok=True)
+            draw_passing(found[part], chosen.out / "passing.png")
         if chosen.out is not None and part in ("roof", "hangar"):
             chosen.out.mkdir(parents=True, exist_ok=True)
             draw_roof(found[part], chosen.out / "roof.png") if part == "roof" else draw_hangar(

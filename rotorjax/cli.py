@@ -1,7 +1,9 @@
 """The command line: `rotorjax COMMAND …`. Bad input is one line on stderr and exit code 2."""
 
 import argparse
+import difflib
 import os
+import signal
 import sys
 import traceback
 from collections.abc import Sequence
@@ -86,7 +88,20 @@ def parsed(arguments: Sequence[str]) -> argparse.Namespace:
     for given in arguments:
         if given.startswith("--") and given.endswith("=--"):  # argparse would take the value for no value at all
             top.error(f"argument {given.removesuffix('=--')}: expected a value, but it is '--'")
-    return top.parse_args(arguments)
+    chosen, unknown = top.parse_known_args(arguments)
+    if unknown:
+        _refuse_unknown(top, chosen.command, unknown[0])
+    return chosen
+
+
+def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> NoReturn:
+    """Leave for an argument that a command does not have, with the option that may have been meant."""
+    from rotorjax.commands.arguments import commands_of
+
+    parser = commands_of(top)[command]
+    options = [option for action in parser._actions for option in action.option_strings if option.startswith("--")]
+    near = difflib.get_close_matches(given.partition("=")[0][:100], options, n=1)
+    parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:
@@ -159,6 +174,8 @@ def script() -> NoReturn:
     from rotorjax.io import terminal
 
     terminal.make_safe()
+    if "simulate" in sys.argv[1:2]:  # a cluster whose time is up asks with SIGTERM: a march then keeps what it had
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     code = main()
     if code == INTERRUPTED:
         sys.stdout.flush()

@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from rotorjax.frames import to_ellipsoidal
 from rotorjax.ground import Plane, TurnedPlane
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.surface import Solid
 from rotorjax.rotor.blade_element import SectionLoads
 from rotorjax.rotor.flap_lag import Blade, blade_of
 from rotorjax.rotor.geometry import Rotor
@@ -30,6 +31,7 @@ from rotorjax.wake.settings import WakeSettings
 
 class CoupledWake(eqx.Module):
     """Parameters p of a rotor in its free wake, all leaves differentiable. ground: in level axes, or None for none.
+    surfaces: in level axes about the place from which the hub's `RotorInputs.place` counts.
 
     The state's inflow is a `WakeState` of K = B slices, blade 0 first. Climb comes from the hub's motion, not from the
     operating point.
@@ -40,6 +42,7 @@ class CoupledWake(eqx.Module):
     blade: Blade
     ground: Plane | None
     settings: WakeSettings
+    surfaces: Solid | None = None
 
     @property
     def edges(self) -> Float[Array, " R+1"]:
@@ -96,6 +99,8 @@ def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
     model = eqx.tree_at(lambda m: m.flight, p._rigid, flight, is_leaf=lambda v: v is None)
     if p.ground is not None and u.turn is not None:
         model = replace(model, ground=TurnedPlane(p.ground.height, p.ground.slope, u.turn))
+    if p.surfaces is not None:
+        model = replace(model, surfaces=p.surfaces.seen_from(u.place, u.turn))
     return driven(model, _inputs(u))
 
 

@@ -4,6 +4,7 @@
 answered by a model outside its own theory.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +48,8 @@ TABLE: dict[str, Limits] = {
     "vpbfsm": Limits(0.3, 0.05, 59.9, 0.5, _ALL, "Hayden's measurements begin at 0.3"),
     "freewake": Limits(0.3, 0.05, 59.9, 0.5, _UPRIGHT, "wakes that leave the disk downward are what was verified"),
 }
+THRUST = Range(0.0, 0.1, above=True)  # C_T of a rotor that is to be trimmed
+ADVANCE = Range(0.0, max(limits.advance for limits in TABLE.values()))
 CLIMB = Range(-0.3, 0.5, "ΩR", hint="beyond, most of the blade is stalled or unloaded")
 
 
@@ -60,11 +63,12 @@ def check_place(model: str, height: float | None, slope_deg: float = 0.0) -> Non
     if height < limits.height:
         raise InputError(
             f"Argument `height` must be at least {limits.height:g} for {model} ({limits.why}), but is {height:g}"
+            + _instead(lambda other: height >= other.height and slope_deg <= other.slope)
         )
     if slope_deg > limits.slope:
-        others = " or ".join(name for name, other in TABLE.items() if slope_deg <= other.slope) or "less"
         raise InputError(
-            f"Argument `slope` must be at most {limits.slope:g} deg for {model}, but is {slope_deg:g}: use {others}"
+            f"Argument `slope` must be at most {limits.slope:g} deg for {model}, but is {slope_deg:g}"
+            + _instead(lambda other: slope_deg <= other.slope)
         )
     clearance = height * np.cos(slope) - np.sin(slope)
     if clearance < limits.clearance:
@@ -72,6 +76,12 @@ def check_place(model: str, height: float | None, slope_deg: float = 0.0) -> Non
             f"Argument `height` must leave the rim {limits.clearance:g} R over the ground for {model}, but at "
             f"{height:g} over {slope_deg:g} deg it leaves {clearance:.3g} R"
         )
+
+
+def _instead(serves: Callable[[Limits], bool]) -> str:
+    """The models that serve where one does not, as the end of a message."""
+    others = [name for name, limits in TABLE.items() if serves(limits)]
+    return f": use {' or '.join(others)}" if others else ""
 
 
 def check_flight(model: str, thrust: float, climb: float, advance: float = 0.0) -> FlightState:
@@ -82,6 +92,13 @@ def check_flight(model: str, thrust: float, climb: float, advance: float = 0.0) 
     if state not in TABLE[model].states:
         raise InputError(_unknown(model, state, thrust, climb))
     return state
+
+
+def of_the_instant(advance: float, slope_deg: float) -> str | None:
+    """What to know of a level flight over a slope, which changes its height."""
+    if not advance or not slope_deg:
+        return None
+    return f"over a slope of {slope_deg:g} deg a level flight changes its height: the trim is that of the instant"
 
 
 def _unknown(model: str, state: FlightState, thrust: float, climb: float) -> str:

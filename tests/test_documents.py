@@ -126,7 +126,8 @@ def test_code_of_the_site_runs(page, own_rotor, monkeypatch, capsys):
 @pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda p: p.stem)
 def test_commands_of_the_documents_are_commands(page):
     text = page.read_text()
-    for line in COMMAND.findall("".join(re.findall(r"```sh\n(.*?)```", text, re.DOTALL))):
+    inline = [] if page.stem != "README" else re.findall(r"`(rotorjax [^`|]+)`", text)
+    for line in COMMAND.findall("\n".join([*re.findall(r"```sh\n(.*?)```", text, re.DOTALL), *inline])):
         cli.parsed(shlex.split(line))
 
 
@@ -138,7 +139,7 @@ def test_python_example(capsys):
 
 
 def test_files_that_the_readme_names_exist():
-    for name in re.findall(r"`((?:notebooks|rotorjax)/[\w./]+)`|\]\((docs/[\w.]+)\)", README):
+    for name in re.findall(r"`((?:notebooks|rotorjax)/[\w./]+)`|\]\(([\w./-]+)\)", README):
         assert (ROOT / (name[0] or name[1])).exists(), name
 
 

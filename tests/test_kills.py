@@ -19,7 +19,7 @@ from wakes import made_up
 
 from rotorjax.bench.cases import study_cases
 from rotorjax.bench.settings import study_settings
-from rotorjax.cli import main
+from rotorjax.cli import main, script
 from rotorjax.io import netcdf
 from rotorjax.study import run
 from rotorjax.study.run import solve_cases
@@ -138,6 +138,29 @@ def test_commands_that_keep_nothing_leave_nothing_and_say_nothing_of_it(tmp_path
     assert main([command, *arguments, "--out", str(tmp_path / "out")]) == 130
     assert capsys.readouterr().err.strip().endswith(f"rotorjax {command}: interrupted")
     assert not list((tmp_path / "out").iterdir())
+
+
+def test_a_cluster_that_asks_to_end_interrupts_a_march(tmp_path, monkeypatch, capsys):
+    def asked_to_end(*_, **__):
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60.0)
+
+    def left(code):
+        raise SystemExit(code)
+
+    place, arguments = STUBS["simulate"]
+    (tmp_path / "case.toml").write_text(FLIGHT)
+    monkeypatch.setattr(place, asked_to_end)
+    arguments = [one.format(tmp=tmp_path) for one in arguments]
+    monkeypatch.setattr(sys, "argv", ["rotorjax", "simulate", *arguments, "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(os, "_exit", left)
+    usual = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(SystemExit, match="130"):
+            script()
+    finally:
+        signal.signal(signal.SIGTERM, usual)
+    assert capsys.readouterr().err.strip().endswith("rotorjax simulate: interrupted")
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is read-only to root")

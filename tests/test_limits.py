@@ -14,7 +14,7 @@ from rotorjax.bench.settings import study_settings
 from rotorjax.bench.single import check_case
 from rotorjax.errors import InputError
 from rotorjax.inflow.momentum import flight_state, induced_inflow
-from rotorjax.limits import TABLE, check_flight, check_place, markdown, steady_thrusts
+from rotorjax.limits import TABLE, check_flight, check_place, markdown, of_the_instant, steady_thrusts
 from rotorjax.potential.model import finite_state_model, mean_inflow
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.derived import derived, notes
@@ -154,3 +154,9 @@ def test_single_precision_solves_the_readmes_case():
         single = alone(Case(1.0, 15.0), study_settings("uh60"))
     np.testing.assert_allclose(single[1].CT, double[1].CT, rtol=5e-6)
     np.testing.assert_allclose(single[0].mean_inflow, double[0].mean_inflow, rtol=5e-6)
+
+
+def test_a_level_flight_over_a_slope_is_told_to_be_of_the_instant():
+    assert of_the_instant(0.1, 0.0) is None
+    assert of_the_instant(0.0, 5.0) is None
+    assert "a slope of 5 deg" in of_the_instant(0.1, 5.0)

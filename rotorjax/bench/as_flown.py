@@ -5,6 +5,7 @@ import jax.numpy as jnp
 
 from rotorjax.checks import Range, check_range
 from rotorjax.errors import InputError
+from rotorjax.limits import ADVANCE, THRUST
 from rotorjax.operating import RANGES, OperatingPoint, standard_air
 from rotorjax.rotor.geometry import Rotor
 
@@ -30,15 +31,23 @@ def in_air(operating: OperatingPoint, altitude: float | None = None, density: fl
 
 
 def thrust_coefficient(weight: float, rotor: Rotor, operating: OperatingPoint) -> float:
-    """C_T of a thrust in N along the shaft. Raises InputError where it is not positive."""
+    """C_T of a thrust in N along the shaft. Raises InputError where it is not positive, or more than any rotor's."""
     check_range("weight", weight, WEIGHT)
-    return weight / float(operating.force(rotor.radius))
+    return _comes_to("weight", weight, WEIGHT, "C_T", weight / float(operating.force(rotor.radius)), THRUST)
 
 
 def advance_ratio(speed: float, rotor: Rotor, operating: OperatingPoint) -> float:
-    """Return μ of a horizontal speed in m/s. Raises InputError where it is negative or no rotor's."""
+    """Return μ of a horizontal speed in m/s. Raises InputError where it is negative or beyond every model."""
     check_range("speed", speed, SPEED)
-    return speed / float(operating.tip_speed(rotor.radius))
+    return _comes_to("speed", speed, SPEED, "μ", speed / float(operating.tip_speed(rotor.radius)), ADVANCE)
+
+
+def _comes_to(name: str, given: float, kind: Range, symbol: str, found: float, allowed: Range) -> float:
+    """A coefficient, checked where the user's own key and unit are still known."""
+    if found not in allowed:
+        comes = f"{given:g} {kind.unit} comes to {found:.4g}"
+        raise InputError(f"Argument `{name}` must come to a {symbol} that is {allowed}, but {comes}")
+    return found
 
 
 def _arrays(values: tuple[float, ...]) -> tuple:

@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,12 @@ if TYPE_CHECKING:
     from rotorjax.operating import OperatingPoint
     from rotorjax.rotor.geometry import Rotor
     from rotorjax.trim.run import Request
+
+
+def commands_of(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of all commands, by name."""
+    (commands,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return dict(commands.choices)
 
 
 def add_rotor(parser: argparse.ArgumentParser) -> None:
@@ -71,13 +78,21 @@ def case_of(chosen: argparse.Namespace) -> "Case":
     return case
 
 
-def introduce(rotor: "Rotor", operating: "OperatingPoint", moves: bool = False) -> None:
-    """The rotor's derived numbers at the top of a run, and on stderr what to know of blades that move."""
+def introduce(rotor: "Rotor", operating: "OperatingPoint", moves: bool = False, about: Sequence[str] = ()) -> None:
+    """The rotor's derived numbers at the top of a run, and on stderr notes on blades that move, and about more."""
     from rotorjax.rotor.derived import describe, notes
 
     print(describe(rotor, operating))
-    for note in notes(rotor) if moves else ():
+    for note in (*(notes(rotor) if moves else ()), *about):
         print(f"note: {note}", file=sys.stderr)
+
+
+def introduce_flights(requests: "Sequence[Request]") -> None:
+    """The same for trims of one rotor."""
+    from rotorjax.limits import of_the_instant
+
+    about = dict.fromkeys(note for one in requests if (note := of_the_instant(one.advance, one.slope_deg)))
+    introduce(requests[0].rotor, requests[0].operating, moves=True, about=tuple(about))
 
 
 def names_of(text: str) -> tuple[str, ...]:

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from rotorjax.commands.arguments import commands_of
+
 
 def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
@@ -21,14 +23,9 @@ def run(chosen: argparse.Namespace) -> int:
     import shtab
 
     top: argparse.ArgumentParser = chosen.program
-    for each in (top, *_commands(top).values()):
+    for each in (top, *commands_of(top).values()):
         for action in each._actions:
             if action.type is Path:
                 setattr(action, "complete", shtab.DIRECTORY if action.metavar == "DIR" else shtab.FILE)  # noqa: B010
     print(shtab.complete(top, shell=chosen.shell))
     return 0
-
-
-def _commands(top: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    (commands,) = (a for a in top._actions if isinstance(a, argparse._SubParsersAction))
-    return dict(commands.choices)

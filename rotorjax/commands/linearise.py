@@ -57,7 +57,7 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _trimmed(chosen: argparse.Namespace) -> int:
     """Models of a trimmed rotor, at one place or several."""
-    from rotorjax.commands.arguments import introduce
+    from rotorjax.commands.arguments import introduce_flights
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, schedule, trim_output
     from rotorjax.trim.run import Result
@@ -68,7 +68,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     for request in requests:
         flight.check(request, wanted)
     out = make_folder(chosen.out)
-    introduce(requests[0].rotor, requests[0].operating, moves=True)
+    introduce_flights(requests)
     with _progress_bar() as progress:
         found = schedule.flights(requests, wanted, progress)
     lost = [one for one in found if isinstance(one, Result)]

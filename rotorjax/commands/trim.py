@@ -37,7 +37,7 @@ def register(commands: argparse._SubParsersAction) -> None:
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
     from rotorjax.bench.single_output import check_picture
-    from rotorjax.commands.arguments import flown, introduce
+    from rotorjax.commands.arguments import flown, introduce_flights
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output, write_json
     from rotorjax.trim.curve import curve, requests
@@ -63,7 +63,7 @@ def run(chosen: argparse.Namespace) -> int:
         check_output(path)
     pictured = chosen.plot is not None or chosen.html is not None
     free = [*requests(base, speeds, [None])] if pictured and len(heights) > 1 else []
-    introduce(base.rotor, base.operating, moves=True)
+    introduce_flights(wanted)
     results = curve([*wanted, *free])
     found = [numbers(result) for result in results[: len(wanted)]]
     print("\n\n".join(table(one) for one in found))

@@ -9,7 +9,13 @@ from jaxtyping import PyTree
 
 from rotorjax.errors import InputError
 from rotorjax.ode.newton import LinearSolve
-from rotorjax.ode.outcome import Log, Measure, Outcome, flat_residual, flatten, relative_rms, traceable
+from rotorjax.ode.outcome import Log, Measure, Outcome, attainable, flat_residual, flatten, relative_rms, traceable
+from rotorjax.ode.threads import one_thread
+
+ALIKE = 1e-3
+"""Singular value, over the largest one of unit differences, below which a combination of them is dropped: old ones grow
+parallel to each other, and what is left between them is curvature, which leads astray.
+"""
 
 
 class _Window:
@@ -26,13 +32,15 @@ class _Window:
     def push(self, dx: np.ndarray, df: np.ndarray) -> None:
         self.dx, self.df = [*self.dx, dx][-self.size :], [*self.df, df][-self.size :]
 
+    @one_thread
     def advance(self, x: np.ndarray, f: np.ndarray, mixing: float) -> np.ndarray:
         """Next iterate: the combination of past residuals that is least, plus `mixing` of what is left of it."""
         if not self.dx:
             return x + mixing * f
         dx, df = np.stack(self.dx, axis=1), np.stack(self.df, axis=1)
-        # Old differences grow parallel to each other; lstsq drops such directions below rcond.
-        weights = np.linalg.lstsq(df, f, rcond=1e-12)[0]
+        sizes = np.linalg.norm(df, axis=0)
+        sizes[sizes == 0] = 1.0
+        weights = np.linalg.lstsq(df / sizes, f, rcond=ALIKE)[0] / sizes
         return x + mixing * f - (dx + mixing * df) @ weights
 
 
@@ -57,8 +65,9 @@ def anderson(
     evaluates it: one program serves both. safeguard: a residual that grows to this many times the best one (or is not
     finite) goes back to the best iterate, forgets the window and halves the mixing until there is a new best.
 
-    Numbers in `args` may change from call to call without compiling again, as long as `g` is the same function.
-    A run that diverges or is interrupted returns the best iterate with `converged` False and says why.
+    In single precision `tol` is at least 1e-5. Numbers in `args` may change from call to call without compiling again,
+    as long as `g` is the same function. A run that diverges or is interrupted returns the best iterate with `converged`
+    False and says why.
 
     Raises InputError where a setting is out of range, x0 is not made of finite floating-point arrays, or `g` returns
     another structure.
@@ -78,7 +87,7 @@ def anderson(
 
     past, share = _Window(window), mixing
     x = np.asarray(flat)
-    with Log("anderson", tol, max_iterations, progress) as log:
+    with Log("anderson", attainable(tol, flat.dtype), max_iterations, progress) as log:
         f = residual(x)
         best_f = f
         done = log.note(x, measure(f, x))

@@ -86,12 +86,23 @@ class Solid(eqx.Module):
 
     panels: all of them. inverse (P, P): of the matrix of normal velocities; it belongs to the numbers of `panels` and
     of the plane, so make it anew where they change (`refitted`). share: of the panels' flow that counts, 1 in every
-    physical case; a search may start below.
+    physical case; a search may start below. wind (3,): of the air far away over the surfaces, over ΩR, in their axes;
+    None where they stand still under the hub, and the wind is the hub's.
     """
 
     panels: Panels
     inverse: Float[Array, "P P"]
     share: Float[Array, ""]
+    wind: Float[Array, "3"] | None = None
+
+    def seen_from(self, place: Float[Array, "3"] | None, turn: Float[Array, "3 3"] | None) -> "Solid":
+        """The surfaces in the frame of a hub at a place over R, turned by a matrix; the inverse stays what it is."""
+        corners, wind = self.panels.corners, self.wind
+        if place is not None:
+            corners = corners - place
+        if turn is not None:
+            corners, wind = corners @ turn.T, None if wind is None else turn @ wind
+        return replace(self, panels=Panels(corners), wind=wind)
 
     def densities(self, through: Float[Array, " P"], ground: Plane | None = None) -> Float[Array, " P"]:
         """Source densities over ΩR that answer a flow with these normal velocities at the panels' middles."""

@@ -16,13 +16,14 @@ from rotorjax.frames import rotate_about_shaft, to_ellipsoidal
 
 
 class RotorInputs(eqx.Module):
-    """Inputs u_R of Eq. 11, the height over ground and the attitude; every field is a scalar array.
+    """Inputs u_R of Eq. 11, the height over ground and the attitude; every field but the last is a scalar array.
 
     theta_1c, theta_1s, theta_0: pitch θ₀ + θ₁c cos ψ + θ₁s sin ψ (rad). u, v, w: velocity of the hub over Ω_ref R,
     forward, to starboard and down, along the shaft's axes. p, q, r: its angular velocity over Ω_ref, roll to starboard,
     nose up, nose to starboard. u_rate … r_rate: their rates per radian. omega: Ω/Ω_ref. omega_rate: its rate. height:
     hub above ground over R, straight down, None without ground. roll to starboard, pitch nose up, heading to starboard
-    (rad): attitude of the shaft's axes; all None for a shaft that stands upright, and with it the ground.
+    (rad): attitude of the shaft's axes; all None for a shaft that stands upright, and with it the ground. place (3,):
+    of the hub over R among solid surfaces (level axes, aft, to starboard, up), from where they are given; None without.
     """
 
     theta_1c: Float[Array, ""]
@@ -46,6 +47,7 @@ class RotorInputs(eqx.Module):
     roll: Float[Array, ""] | None = None
     pitch: Float[Array, ""] | None = None
     heading: Float[Array, ""] | None = None
+    place: Float[Array, "3"] | None = None
 
     @property
     def velocity(self) -> Float[Array, "3"]:
@@ -83,7 +85,7 @@ def rotor_inputs(**values: float) -> RotorInputs:
 
     Raises InputError where a value is not a finite number, or height is not positive.
     """
-    names = [name for name in RotorInputs.__dataclass_fields__ if name not in ("height", *ATTITUDE)]
+    names = [name for name in RotorInputs.__dataclass_fields__ if name not in ("height", "place", *ATTITUDE)]
     height = values.pop("height", None)
     if height is not None:
         check_number("height", height, 0.0, open_=True)

@@ -29,6 +29,7 @@ from rotorjax.coupled_wake import CoupledWake
 from rotorjax.device import full_products, on_cpu
 from rotorjax.errors import InputError
 from rotorjax.ode import exponential, runge_kutta
+from rotorjax.panels.surface import Panels, check_clear, solid
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.case import OldAge, Precision
 from rotorjax.simulation.start import Start, from_result
@@ -243,13 +244,15 @@ def march(
     old_age: OldAge = "step",
     batch: int | None = None,
     bound_filter: Literal["pass", "solution"] = "solution",
+    surfaces: Panels | None = None,
 ) -> March:
     """March a trim with any inflow, one step at a time (the module tells how).
 
     steps_per_turn: of a revolution, None for what the wake needs, at least 24, or 120 without one. old_age: what a free
     wake's closure and the ground induce is summed in "two steps", a "step" or a "stage" once. batch: so many marches at
     once, states and controls with a leading axis. bound_filter: "pass" for the paper's, which needs ten times the
-    steps.
+    steps. surfaces: what the hub of a free wake flies past, in level axes; they stand in the air, and controls say
+    where the hub is among them (`place`, over R, zero at the start).
 
     Raises InputError where the steps are too few for the wake, with the number that is enough.
     """
@@ -259,6 +262,8 @@ def march(
     if old_age not in get_args(OldAge):
         raise InputError(f"Argument `old_age` must be one of {get_args(OldAge)}, but is {shown(old_age)}")
     context = precision_of(precision)
+    if surfaces is not None:
+        start = _past(start, surfaces)
     start = replace(start, p=marching(start.p, bound_filter=bound_filter))
     steps = usual_steps(start) if steps_per_turn is None else check_whole("steps_per_turn", steps_per_turn, 1, 100_000)
     if steps_per_turn is not None and steps < (least := least_steps(start)):
@@ -279,6 +284,15 @@ def march(
     seconds = angle / float(start.p.operating.omega)
     needed = stable_steps(start)
     return March(first, u, steps, seconds, precision, steps / needed if needed else np.inf, program)
+
+
+def _past(start: Start, surfaces: Panels) -> Start:
+    """The start with surfaces that the hub flies past. Raises InputError without a free wake, and as `solid` does."""
+    if not isinstance(start.p, CoupledWake) or start.p.surfaces is not None:
+        raise InputError("Argument `surfaces` must come with a trim in the free wake that has none of its own")
+    check_clear(surfaces)
+    closed = replace(solid(surfaces, start.p.ground), wind=jnp.zeros(3))
+    return replace(start, p=replace(start.p, surfaces=closed), inputs=replace(start.inputs, place=jnp.zeros(3)))
 
 
 def _several(one: Callable) -> Callable:

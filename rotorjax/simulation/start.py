@@ -82,7 +82,12 @@ def from_wake(trimmed: TrimmedInWake) -> Start:
     height = None if ground is None else ground.height
     theta_0, theta_1c, theta_1s = trimmed.z.controls
     inputs = replace(p.inputs, theta_0=theta_0, theta_1c=theta_1c, theta_1s=theta_1s, height=height)
-    coupled = CoupledWake(model.rotor, model.operating, p.blade, ground, model.settings)
+    surfaces = model.surfaces
+    if surfaces is not None:  # the wind over them is that of the trim, however the hub then moves
+        back = None if p.inputs.turn is None else p.inputs.turn.T
+        surfaces = replace(surfaces, wind=-p.inputs.velocity).seen_from(None, back)
+        inputs = replace(inputs, place=jnp.zeros(3))
+    coupled = CoupledWake(model.rotor, model.operating, p.blade, ground, model.settings, surfaces)
     return Start(coupled, state_at(trimmed, 0), inputs, tilt)
 
 

@@ -83,6 +83,11 @@ def residual(z: InWake, p: WakeTrim) -> InWake:
     return InWake(wake, flap, lag, _trim_defect(z, loads, p))
 
 
+def passed(z: InWake, p: WakeTrim) -> InWake:
+    """Wake, blades and controls after one pass: z and its residual."""
+    return jax.tree.map(jnp.add, z, residual(z, p))
+
+
 def loads_of(model: FreeWake, found: Evaluation) -> AirLoads:
     """Air loads of the blades in a wake, leading axis K."""
     return wake_air_loads(model, found.velocities.control, found.loads, azimuths(found.state))

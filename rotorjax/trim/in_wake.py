@@ -2,9 +2,9 @@
 
 From a trim nearby the way leads straight to the case, the wake carried by what the wind changes. From nothing, in hover
 the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts from a
-prescribed one: Anderson's iteration and Newton with thick cores, then Newton with the settings' own. Where that is
-lost, in slow flight or near the ground, it starts with thicker cores far over the ground in an auxiliary flow down that
-carries the wake away, and follows the branch as the flow is taken back, the ground comes up and the cores thin.
+prescribed one with thick cores, which thin as passes of the fixed point go on under Anderson's iteration. Where that is
+lost they thin in careful steps. Where there is none with thick cores it starts far over the ground in an auxiliary flow
+down that carries the wake away, and follows the branch as the flow is taken back and the ground comes up.
 """
 
 from collections.abc import Callable
@@ -26,12 +26,13 @@ from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import SMALLEST_STEP, newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.surface import Panels, refitted
 from rotorjax.rotor.flap_lag import blade_of, lag_frequency
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import RotorInputs
-from rotorjax.trim.free_wake import InWake, WakeTrim, carried, first_guess, flown, residual
+from rotorjax.trim.free_wake import InWake, WakeTrim, carried, first_guess, flown, passed, residual
 from rotorjax.trim.problem import Aim
-from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.model import AMONG, FreeWake, free_wake
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 from rotorjax.wake.solution import solve
 
@@ -40,20 +41,30 @@ Progress = Callable[[str, float], None]
 TOL = 1e-7
 """Relative rms of the residual of wake, blades and controls together."""
 
-COARSE = 1e-5
-"""The same on the way to the case."""
+ROUGH, CLOSE, NEAR = 1e-3, 2e-4, 5e-3
+"""The same on the way to the case, quickly and carefully, and where to go on all the same: from further off no search
+has arrived.
+"""
 
-THICKER = 1.6
-"""Cores at the start in a wind, over the settings': with them Anderson's iteration converges from a prescribed wake."""
+SHARE, WINDOW, PASSES = 0.1, 100, 250
+"""Anderson's iteration: the share of the residual that is added, how many past passes are combined, and how many are
+made at most. With so many combined, passes converge as Newton's method does, which takes two to four times as many
+products with the Jacobian, each as dear as one or two passes.
+"""
 
-THICKEST = 2.5
-"""The same where that fails, in slow flight and near the ground: vortices beside the disk do not roll up yet."""
+FEW, EASY = 100, 40
+"""Passes after which a rough step is given up, and those of an easy one."""
+
+THICK = 4.0
+"""Cores at the start in a wind, over the settings': with these, vortices beside the disk do not roll up and passes of
+the fixed point converge from a prescribed wake, in slow flight and near the ground, too.
+"""
+
+QUICK, CAREFUL = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1)
+"""Cores on the way, on the first one and where that is lost."""
 
 WASHOUT, FAR = 0.08, 4.0
 """Auxiliary flow (over ΩR) and height (over R) that a search begins with where it is lost without."""
-
-DIRECT, WASHED = 80, 80
-"""Iterations of Anderson's from a prescribed wake; on the straight way a wake that needs more is lost."""
 
 LEAST, NEAREST = 0.01, 0.1
 """Least step of a continuation over the whole way, and over that from a neighbour, which is to be short."""
@@ -61,7 +72,7 @@ LEAST, NEAREST = 0.01, 0.1
 
 @dataclass(frozen=True)
 class TrimmedInWake:
-    """A trim in the free wake, converged or not. outcome: of the last Newton iteration; iterations: of all of them."""
+    """A trim in the free wake, converged or not. outcome: of the last search; iterations: passes and Newton's."""
 
     z: InWake
     p: WakeTrim
@@ -82,14 +93,17 @@ def wake_trim(
     ground: Plane | None = None,
     settings: WakeSettings | None = None,
     aim: Aim = "flapping",
+    surfaces: Panels | None = None,
 ) -> WakeTrim:
-    """Set a trim up. ground: in level axes; the trim's model has it as the tilted shaft sees it.
+    """Set a trim up. ground, surfaces: in level axes; the trim's model has them as the tilted shaft sees them.
 
     Raises InputError where the rotor has no hinge data or nothing holds its blades in lag, the disk cuts the ground, or
     as `free_wake` does.
     """
     if settings is None:
-        settings = flight_settings(rotor.blades) if windy(inputs) else wake_settings(azimuths=2 * rotor.blades)
+        cores: dict[str, Any] = {} if surfaces is None else AMONG
+        flown = windy(inputs)
+        settings = flight_settings(rotor.blades) if flown else wake_settings(azimuths=2 * rotor.blades, **cores)
     still = eqx.tree_at(lambda o: o.climb, operating, jnp.zeros_like(operating.climb))
     if ground is not None and inputs.pitch is not None:
         ground = pitched(ground, inputs.pitch)
@@ -98,7 +112,9 @@ def wake_trim(
             f"Argument `ground` must lie under the disk, but the tilted disk's rim is {-float(ground.clearance):.3g} R "
             "under it: set a greater height or less tilt"
         )
-    model = free_wake(rotor, still, ground, settings)
+    if surfaces is not None and inputs.turn is not None:
+        surfaces = Panels(surfaces.corners @ inputs.turn.T)
+    model = free_wake(rotor, still, ground, settings, surfaces)
     blade = blade_of(rotor, operating)
     if not float(lag_frequency(blade)) > 0:
         raise InputError(
@@ -146,7 +162,8 @@ def trim_in_wake(
         if found.outcome.converged or stages.interrupted:
             return found
     if windy(p.inputs):
-        return _from_wind(p, controls, coning, stages)
+        way = _from_wind if p.model.surfaces is None else _among
+        return way(p, controls, coning, stages)
     return _from_hover(p, controls, coning, stages)
 
 
@@ -166,6 +183,22 @@ class _Stages:
             self._progress(stage, outcome.residual)
         return outcome
 
+    def found(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+        """By passes of the fixed point, and at the case itself by Newton's method where these stall near it; from one
+        hover to the next by Newton's alone.
+        """
+        if z.flap.shape[0] == 1:
+            return self.newton(stage, z, p, min(tol, 1e-5), hard=False)
+        near = self.passes(stage, z, p, tol)
+        if near.converged or near.interrupted or tol == ROUGH or near.residual > ROUGH:
+            return near
+        return self.newton(stage, near.x, p, tol, hard=False)
+
+    def passes(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+        """Passes of the fixed point under Anderson's iteration."""
+        most = FEW if tol == ROUGH else PASSES
+        return self.done(stage, anderson(passed, z, p, mixing=SHARE, window=WINDOW, tol=tol, max_iterations=most))
+
     def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float, *, hard: bool = True) -> Outcome:
         """Newton-Krylov on wake, blades and controls together. hard: try the least steps; else shorten the way."""
         linear = Krylov(forcing=0.03, restart=120, restarts=1, tightest=1e-8 if hard else 1e-3)
@@ -178,9 +211,10 @@ def _from_neighbour(p: WakeTrim, near: TrimmedInWake, stages: _Stages) -> Trimme
     """All numbers of the case go evenly from the neighbour's to its own."""
 
     def at(s: float) -> WakeTrim:
-        return (
-            p if s == 1 else jax.tree.map(lambda a, b: (1 - s) * a + s * b if eqx.is_inexact_array(b) else b, near.p, p)
-        )
+        if s == 1:
+            return p
+        between = jax.tree.map(lambda a, b: (1 - s) * a + s * b if eqx.is_inexact_array(b) else b, near.p, p)
+        return _refitted(between)
 
     def carry(z: InWake, here: float, there: float) -> InWake:
         wind = (there - here) * (near.p.inputs.velocity - p.inputs.velocity)
@@ -223,51 +257,65 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
 
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    """Straight to the case with thick cores, and where that is lost by way of an auxiliary flow; then to its cores."""
-    thick = _with_cores(replace(p, aim="flapping"), THICKER)
-    found = _to_thick(thick, controls, coning, stages)
-    if found.converged:
-        branch = _thinner(p, found.x, THICKER, stages)
-        if branch.reached:
-            return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
-    if stages.interrupted:
-        return TrimmedInWake(found.x, p, replace(found, converged=False, why="interrupted"), stages.iterations)
-    return _by_way_of_washout(p, controls, coning, stages)
+    """From a wake with thick cores as these thin, quickly, and where that is lost in careful steps."""
+    thick = _with_cores(replace(p, aim="flapping"), THICK)
+    start = stages.passes("thick cores", _prescribed(thick, controls, coning), thick, ROUGH)
+    if not (start.converged or stages.interrupted):
+        start = _by_way_of_washout(thick, controls, coning, stages)
+    if not start.converged:
+        return _lost(start.x, start.why, p, stages)
+    for cores, rough in ((QUICK, ROUGH), (CAREFUL, CLOSE)):
+        found = _thinner(p, start.x, cores, rough, stages)
+        if found.converged or stages.interrupted:
+            return TrimmedInWake(found.x, p, found, stages.iterations)
+    return _lost(found.x, found.why, p, stages)
 
 
-def _to_thick(thick: WakeTrim, controls, coning: float, stages: _Stages) -> Outcome:
-    """The trim with thick cores from a prescribed wake."""
-    guess = _prescribed(thick, controls, coning)
-    first = _anderson("prescribed wake", guess, thick, DIRECT, stages)
-    return stages.newton("thick cores", first.x, thick, COARSE) if first.converged else first
+def _thinner(p: WakeTrim, z: InWake, cores: tuple[float, ...], rough: float, stages: _Stages) -> Outcome:
+    """The trim by passes to `rough` at each of some thicknesses of the cores, down to the settings' own."""
+    for factor in (*cores, 1.0):
+        found = stages.passes("thinner cores", z, _with_cores(replace(p, aim="flapping"), factor), rough)
+        z = found.x
+        if found.residual > NEAR:
+            return replace(found, why=f"with cores {factor:g} times as thick as asked for: {found.why}")
+    return stages.found("trim", z, p, TOL)
 
 
-def _by_way_of_washout(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    """Trim with thicker cores yet in a flow that carries the wake away, far over the ground; that flow is taken back,
-    the ground comes up, and the cores go back to the settings' own.
-    """
-    thick = _with_cores(replace(p, aim="flapping"), THICKEST)
-    first = _anderson(
-        "auxiliary flow", _prescribed(_washed(thick, 0.0), controls, coning), _washed(thick, 0.0), WASHED, stages
-    )
-    branch = _follow("less auxiliary flow", lambda s: _washed(thick, s), first.x, 0.5, stages)
-    if branch.reached and p.model.ground is not None:
-        branch = _follow("nearer to the ground", lambda s: _lowered(thick, s), branch.last.x, 0.5, stages)
+def _among(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
+    """The trim over the rotor's floor; then the surfaces at once, or as their flow comes up from nothing."""
+    open_air = replace(p, model=replace(p.model, surfaces=None, over=p.model.floor))
+    found = _from_wind(open_air, controls, coning, stages)
+    if not found.outcome.converged:
+        return replace(found, outcome=replace(found.outcome, why=f"without surfaces: {found.outcome.why}"))
+
+    def at(s: float) -> WakeTrim:
+        return eqx.tree_at(lambda q: q.model.surfaces.share, p, jnp.asarray(s, float))
+
+    branch = _follow("trim", at, found.z, 1.0, stages)
     if not branch.reached:
-        return _lost(branch, first, p, stages)
-    branch = _thinner(p, branch.last.x, THICKEST, stages)
+        return _lost(branch.last.x if branch.outcomes else found.z, branch.why, p, stages)
+    return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
+
+
+def _refitted(p: WakeTrim) -> WakeTrim:
+    """A trim whose surfaces have moved, with the inverse that belongs to them."""
+    if p.model.surfaces is None:
+        return p
+    return replace(p, model=replace(p.model, surfaces=refitted(p.model.surfaces, p.model.ground)))
+
+
+def _by_way_of_washout(thick: WakeTrim, controls, coning: float, stages: _Stages) -> Outcome:
+    """Trim with thick cores in a flow that carries the wake away, far over the ground; that flow is taken back and the
+    ground comes up.
+    """
+    washed = _washed(thick, 0.0)
+    first = stages.passes("auxiliary flow", _prescribed(washed, controls, coning), washed, ROUGH)
+    branch = _follow("less auxiliary flow", lambda s: _washed(thick, s), first.x, 0.5, stages)
+    if branch.reached and thick.model.ground is not None:
+        branch = _follow("nearer to the ground", lambda s: _lowered(thick, s), branch.last.x, 0.5, stages)
     if branch.reached:
-        return TrimmedInWake(branch.last.x, p, branch.last, stages.iterations)
-    return _lost(branch, first, p, stages)
-
-
-def _thinner(p: WakeTrim, x: InWake, factor: float, stages: _Stages) -> Branch:
-    """From cores `factor` times as thick to those of p, and to its aim."""
-
-    def at(s):
-        return p if s == 1 else _with_cores(p, factor ** (1 - s))
-
-    return _follow("trim", at, x, 1.0, stages)
+        return branch.last
+    return replace(branch.failed or first, converged=False, why=branch.why)
 
 
 def _follow(
@@ -277,32 +325,23 @@ def _follow(
 
     def step(guess, s, memory):
         last = s == 1 and stage == "trim"
-        found = stages.newton(stage, guess, at(s), TOL if last else COARSE, hard=False)
+        found = stages.found(stage, guess, at(s), TOL if last else ROUGH)
         if last and (stages.nearest is None or found.residual < stages.nearest.residual):
             stages.nearest = found
         return found
 
-    kept = {"smallest": LEAST, "largest": 1.0, "easy": 5, "jump": 0.5}
+    kept = {"smallest": LEAST, "largest": 1.0, "easy": EASY, "jump": 0.5}
     return continuation(step, x, 0.0, 1.0, step=first, **kept | more)
 
 
-def _anderson(stage: str, guess: InWake, p: WakeTrim, most: int, stages: _Stages) -> Outcome:
-    return stages.done(
-        stage,
-        anderson(residual, guess, p, mixing=0.3, window=15, tol=5e-4, max_iterations=most, linear=Krylov()),
-    )
-
-
-def _lost(branch: Branch, first: Outcome, p: WakeTrim, stages: _Stages) -> TrimmedInWake:
+def _lost(x: InWake, why: str, p: WakeTrim, stages: _Stages) -> TrimmedInWake:
     """The end of a search that did not arrive: of the last wake found and the nearest one at the case itself that which
     is nearer to a trim of the case.
     """
-    x = branch.last.x if branch.outcomes else first.x
-    here = newton(residual, x, p, linear=Krylov(), tol=TOL, max_iterations=0)
-    here = replace(here, converged=False, why=branch.why)
+    here = anderson(passed, x, p, tol=TOL, max_iterations=0)
     if stages.nearest is not None and stages.nearest.residual < here.residual:
         here = stages.nearest
-    return TrimmedInWake(here.x, p, here, stages.iterations)
+    return TrimmedInWake(here.x, p, replace(here, converged=False, why=why), stages.iterations)
 
 
 def _prescribed(p: WakeTrim, controls, coning: float) -> InWake:

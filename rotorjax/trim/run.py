@@ -10,13 +10,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number, closest, shown
+from rotorjax.checks import check_number, check_range, closest, shown
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
 from rotorjax.inflow.choice import NAMES, inflow_model
-from rotorjax.limits import check_flight, check_place
+from rotorjax.limits import THRUST, check_flight, check_place
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.surface import Panels
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor, solidity
@@ -38,7 +39,8 @@ INFLOWS = (*NAMES, FREE_WAKE)
 class Request:
     """What to trim. thrust: C_T. height over R; slope, tilt in degrees; climb over ΩR; drag_area: f of the fuselage in
     m², balanced by tilting the shaft, or None for a given tilt. aim: no cyclic flapping, or no hub moments. wake:
-    settings of the free wake, None for those that suit the flight.
+    settings of the free wake, None for those that suit the flight. surfaces: beside and under the hub, in level axes,
+    which stand still under it, so that speed is wind over them; for the free wake.
     """
 
     rotor: Rotor
@@ -54,6 +56,7 @@ class Request:
     aim: Aim = "flapping"
     azimuths: int = AZIMUTHS
     wake: WakeSettings | None = None
+    surfaces: Panels | None = None
 
     @property
     def ground(self) -> Plane | None:
@@ -102,8 +105,12 @@ def check(request: Request) -> None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
         )
+    if request.surfaces is not None and request.inflow != FREE_WAKE:
+        raise InputError(
+            f"Argument `surfaces` must be left out with the inflow '{request.inflow}': only '{FREE_WAKE}' has them"
+        )
     check_number("tilt_deg", request.tilt_deg, -40.0, 40.0)
-    check_number("thrust_coefficient", request.thrust, 0.0, 0.1, open_=True)
+    check_range("thrust_coefficient", request.thrust, THRUST)
     check_flight(request.inflow, request.thrust, request.climb, request.advance)
     check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
@@ -163,7 +170,7 @@ def before_wake(request: Request) -> tuple[WakeTrim, Float[Array, "3"], float]:
     """A trim in the free wake set up, its controls (rad) and its coning (rad) guessed with Pitt-Peters' inflow; a
     fuselage's drag is balanced by the tilt that this has. Raises InputError where even that finds none.
     """
-    first = _in_model(replace(request, inflow="pitt-peters", height=None, slope_deg=0.0))
+    first = _in_model(replace(request, inflow="pitt-peters", height=None, slope_deg=0.0, surfaces=None))
     if not first.outcome.converged:
         raise InputError(
             f"Argument `thrust_coefficient` must be within the rotor's reach, but at {request.thrust:g} no trim is "
@@ -172,7 +179,9 @@ def before_wake(request: Request) -> tuple[WakeTrim, Float[Array, "3"], float]:
     controls = first.z.controls
     coning = float(jnp.mean(outputs_at(first.z, first.flight, first.p).flap))
     inputs = inputs_at(controls, first.flight)
-    p = wake_trim(request.rotor, request.operating, inputs, request.thrust, request.ground, request.wake, request.aim)
+    where = {"ground": request.ground, "surfaces": request.surfaces}
+    own = {"settings": request.wake, "aim": request.aim}
+    p = wake_trim(request.rotor, request.operating, inputs, request.thrust, **where, **own)
     return p, jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s]), coning
 
 

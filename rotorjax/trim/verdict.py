@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.ode.linear import Krylov
-from rotorjax.ode.outcome import ravelled, traceable, unravelled
-from rotorjax.trim.free_wake import InWake, WakeTrim, residual
+from rotorjax.ode.outcome import flat_residual, ravelled, traceable, unravelled
+from rotorjax.trim.free_wake import InWake, WakeTrim, passed, residual
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.means import means
 from rotorjax.trim.solve import Trimmed
@@ -76,7 +76,10 @@ def _watched(found: TrimmedInWake) -> tuple[float, float]:
 
 
 def _step(z: InWake, p: WakeTrim) -> InWake:
-    """The residual, by the program that the search has compiled anyway."""
+    """The residual, by the program that the search has compiled anyway: Newton's in hover, that of passes in a wind."""
     flat, unravel = ravelled(z)
-    value, _ = Krylov().at(residual, unravel, flat, traceable((p,)))
+    if z.flap.shape[0] == 1:
+        value = Krylov().at(residual, unravel, flat, traceable((p,)))[0]
+    else:
+        value = flat_residual(passed, unravel, flat, traceable((p,))) - flat
     return unravelled(unravel, np.asarray(value))

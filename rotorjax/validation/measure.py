@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from rotorjax.frames import disk_points
+from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
@@ -72,8 +72,9 @@ def clearance(solution: Solution) -> float:
     ground = solution.model.ground
     if ground is None:
         return float("inf")
-    heights = [ground.distance(jnp.asarray(nodes)) for nodes in (solution.state.near, solution.state.far)]
-    return float(min(jnp.min(h) for h in heights))
+    psi = jnp.asarray(solution.psi)[:, None]  # each slice's nodes are in its own blade's frame
+    turned = [rotate_about_shaft(v.reshape(psi.size, -1, 3), psi) for v in (solution.state.near, solution.state.far)]
+    return min(float(jnp.min(ground.distance(nodes))) for nodes in turned)
 
 
 _velocity = eqx.filter_jit(velocity)

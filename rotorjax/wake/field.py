@@ -91,7 +91,8 @@ def old_velocities(model: FreeWake, state: WakeState, psi: float | Float[Array, 
     found = _at_targets(model, wake_segments(model, state, psi, "old"), targets, angles)
     if model.ground is None and model.surfaces is None:
         return found
-    return found + _at_targets(model, wake_segments(model, state, psi, "free"), targets, angles, answer=True)
+    free = wake_segments(model, state, psi, "free")
+    return found + _at_targets(_in_calm(model), free, targets, angles, answer=True)
 
 
 def targets_of(model: FreeWake, state: WakeState) -> Float[Array, "K N 3"]:
@@ -144,7 +145,7 @@ def at_instants(
     answer: bool = False,
 ) -> Float[Array, "I N 3"]:
     """Velocity at points of the hub frame, N for each instant, from all blades' wakes, their images in the ground and
-    the surfaces that they blow on; answer: of images and surfaces alone.
+    the surfaces that they and the wind blow on; answer: of images and surfaces alone.
 
     Ground and surfaces are fixed in that frame. Slices i, i + I, i + 2I … are the blades' wakes at instant i. K = 1:
     every blade's wake is the same, and points are seen from the slice's own blade, as level ground looks from all of
@@ -181,8 +182,21 @@ def _flow(
     if model.surfaces is None:
         return found
     panels = model.surfaces.panels
-    through = jnp.sum(induced(panels.middles, ground) * panels.normals, axis=1)
+    through = jnp.sum((induced(panels.middles, ground) + _past(model)) * panels.normals, axis=1)
     return found + model.surfaces.answer(points, through, ground)
+
+
+def _past(model: FreeWake) -> Float[Array, "3"]:
+    """The air that blows past the surfaces where no vortex moves it, in the hub frame."""
+    assert model.surfaces is not None
+    return carried(model, jnp.zeros(())) if model.surfaces.wind is None else model.surfaces.wind
+
+
+def _in_calm(model: FreeWake) -> FreeWake:
+    """The model with surfaces that answer vortices alone: their answer to the wind is summed with other segments."""
+    if model.surfaces is None:
+        return model
+    return replace(model, surfaces=replace(model.surfaces, wind=jnp.zeros(3)))
 
 
 def alone(model: FreeWake) -> FreeWake:

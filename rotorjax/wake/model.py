@@ -11,6 +11,7 @@ frame: x outboard along the blade, y in the direction of rotation, z up. One lay
 """
 
 from dataclasses import replace
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -27,7 +28,7 @@ from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.settings import WakeSettings, hover_settings
 
-AMONG = {"tip_core": 0.05}
+AMONG: dict[str, Any] = {"tip_core": 0.05}
 """Settings of a wake among surfaces beyond those of hover: where turns are not round, thin old vortices wind round each
 other and the search stalls, as in flight."""
 
@@ -87,7 +88,8 @@ class FreeWake(eqx.Module):
 
     washout: velocity (over ΩR) of an auxiliary flow that carries the wake away, 0 in every physical case; the solver
     starts with it and takes it back (solution.py). flight: None for rigid blades in hover or climb. surfaces: what else
-    no air goes through, fixed in the hub frame as the ground is; the wake is then one of K slices.
+    no air goes through, fixed in the hub frame as the ground is; the wake is then one of K slices. over: the floor of a
+    rotor whose surfaces are another's too (several.py), None where it follows from ground and surfaces.
     """
 
     rotor: Rotor
@@ -97,6 +99,7 @@ class FreeWake(eqx.Module):
     washout: Float[Array, ""]
     flight: Flight | None = None
     surfaces: Solid | None = None
+    over: Plane | None = None
 
     def of_slice(self, k: int | Int[Array, ""]) -> "FreeWake":
         """The model of one slice: its blade's motion alone."""
@@ -153,6 +156,8 @@ class FreeWake(eqx.Module):
         """The plane that stands for all that lies under the rotor, where only a plane will do: the turns beyond the
         free ones, and a search's start. Without surfaces the ground itself.
         """
+        if self.over is not None:
+            return self.over
         return self.ground if self.surfaces is None else floor(self.surfaces.panels, self.ground)
 
     @property
@@ -161,7 +166,7 @@ class FreeWake(eqx.Module):
         plane = self.floor
         if plane is not None:
             plane = Plane(plane.height, jnp.zeros_like(plane.slope))
-        return replace(self, ground=plane, surfaces=None)
+        return replace(self, ground=plane, surfaces=None, over=None)
 
     @property
     def axisymmetric(self) -> bool:
@@ -192,14 +197,11 @@ def free_wake(
     azimuths is no multiple of the number of blades, or surfaces cut the disk or cannot be closed (`panels.surface`).
     """
     if settings is None:
-        settings = hover_settings() if surfaces is None else hover_settings(**AMONG)
+        settings = hover_settings() if surfaces is None else among_settings()
     settings = settings.for_blades(rotor.blades)
     check_rotor(rotor, operating)
-    if (ground is not None or surfaces is not None) and known(operating.climb) and float(operating.climb) != 0:
-        raise InputError(
-            f"Argument `operating` must not climb over ground or surfaces (a steady state needs a fixed height), "
-            f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
-        )
+    if ground is not None:
+        _check_climb(operating)
     if settings.azimuths % rotor.blades:
         raise InputError(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
@@ -207,11 +209,30 @@ def free_wake(
         )
     if surfaces is None:
         return FreeWake(rotor, operating, ground, settings, array(0.0))
-    if not isinstance(surfaces, Panels):
-        raise refuse("surfaces", "be made by rj.box, slab, wall, terrain or read_stl", shown(surfaces))
+    check_surfaces(surfaces, operating)
     check_clear(surfaces)
     closed = solid(surfaces, ground)
     return FreeWake(rotor, operating, ground, settings, array(0.0), surfaces=closed)
+
+
+def among_settings() -> WakeSettings:
+    """Settings of a wake among surfaces, where none are asked for."""
+    return hover_settings(**AMONG)
+
+
+def check_surfaces(surfaces: Panels, operating: OperatingPoint) -> None:
+    """Raise InputError where surfaces are no panels or the rotor climbs past them."""
+    if not isinstance(surfaces, Panels):
+        raise refuse("surfaces", "be made by rj.box, slab, wall, terrain or read_stl", shown(surfaces))
+    _check_climb(operating)
+
+
+def _check_climb(operating: OperatingPoint) -> None:
+    if known(operating.climb) and float(operating.climb) != 0:
+        raise InputError(
+            f"Argument `operating` must not climb over ground or surfaces (a steady state needs a fixed height), "
+            f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
+        )
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:

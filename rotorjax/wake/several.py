@@ -2,16 +2,17 @@
 
 Hubs stand at places over R in a common frame (x aft, y to starboard, z up), shafts upright, one radius and one speed.
 A rotor that turns clockwise is kept in a frame mirrored in y, as in potential/rotors.py, so that its blades run along
-rising azimuth too. Level ground answers every wake with its image.
+rising azimuth too. Level ground answers every wake with its image; surfaces answer all wakes of an instant together.
 
 How the rotors see each other:
     K = 1           rotors on one shaft, each in the flow of the others averaged over their azimuth: what is left out is
-                    how the inflow pulses as blades pass each other, 2B times a revolution;
+                    how the inflow pulses as blades pass each other, 2B times a revolution; not among surfaces;
     K slices        rotors anywhere, periodic over the passage of a blade: the slices of one instant see each other
                     where they stand.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import equinox as eqx
@@ -24,13 +25,15 @@ from rotorjax.checks import Range, array, check_range, known, refuse, shown
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
+from rotorjax.panels.kernel import panel_velocity
+from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.dynamics import inputs_of
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, full_state, transported
 from rotorjax.wake.field import at_instants, from_hub, node_velocities, targets_of, to_hub, wake_segments
 from rotorjax.wake.loads import blade_loads
-from rotorjax.wake.model import FreeWake, WakeState, free_wake
+from rotorjax.wake.model import FreeWake, WakeState, among_settings, check_surfaces, free_wake
 from rotorjax.wake.performance import Performance, performance
 from rotorjax.wake.segments import Segments
 from rotorjax.wake.settings import WakeSettings
@@ -51,8 +54,9 @@ class SeveralWakes(eqx.Module):
 
     wakes: every array with a leading axis N. places (N, 3): hubs, over R. senses (N,): 1 counter-clockwise, −1 not.
     phases (N,): azimuth of each rotor's blade 0 as slice 0 stands there, in its own sense. coupling: share of each
-    other's flow that counts, 1 in every physical case. thrusts (N,): C_T that the collectives are trimmed to, or None.
-    slices (static): K.
+    other's flow that counts, 1 in every physical case; a search may begin below. thrusts (N,): C_T that the collectives
+    are trimmed to, or None. surfaces: in the common frame; what each rotor has of them is its floor. slices (static):
+    K.
     """
 
     wakes: FreeWake
@@ -61,11 +65,23 @@ class SeveralWakes(eqx.Module):
     phases: Float[Array, " N"]
     coupling: Float[Array, ""]
     thrusts: Float[Array, " N"] | None
+    surfaces: Solid | None
     slices: int = eqx.field(static=True)
 
     def __len__(self) -> int:
         """N."""
         return len(self.places)
+
+    @property
+    def ground(self) -> Plane | None:
+        """The ground in the common frame."""
+        seen = self.wakes.ground
+        return None if seen is None else Plane(seen.height[0] - self.places[0, 2], seen.slope[0])
+
+    @property
+    def angles(self) -> Float[Array, "N K"]:
+        """Azimuth of each slice, in its rotor's own sense."""
+        return self.phases[:, None] + 2 * jnp.pi / self.slices * jnp.arange(self.slices)
 
     def one(self, i: int) -> FreeWake:
         """The model of one rotor alone, over its own ground."""
@@ -87,6 +103,7 @@ def several_wakes(
     ground: Plane | None = None,
     settings: WakeSettings | None = None,
     *,
+    surfaces: Panels | None = None,
     collectives_deg: ArrayLike | None = None,
     thrusts: ArrayLike | None = None,
     phases_deg: ArrayLike | None = None,
@@ -94,17 +111,23 @@ def several_wakes(
     """Make the model of N like rotors in one free wake, hovering or climbing, in or out of ground effect.
 
     places (N, 3): hubs over R, x aft, y to starboard, z up. senses: 1 counter-clockwise, −1 clockwise, seen from above;
-    by default they alternate. ground: level, its height counted from the common origin. collectives_deg (N,): the
-    operating point's by default. thrusts (N,): C_T of each rotor that its collective is trimmed to. phases_deg (N,):
-    where blade 0 of each stands as slice 0 does. Rotors on one shaft are solved in each other's mean flow (K = 1).
+    by default they alternate. ground: level, its height counted from the common origin. surfaces: as in `free_wake`,
+    in the common frame. collectives_deg (N,): the operating point's by default. thrusts (N,): C_T of each rotor that
+    its collective is trimmed to. phases_deg (N,): where blade 0 of each stands as slice 0 does. Rotors on one shaft are
+    solved in each other's mean flow (K = 1) where there are no surfaces.
 
-    Raises InputError where shapes differ, a sense is not ±1, disks overlap, the ground is tilted or cuts a disk.
+    Raises InputError where shapes differ, a sense is not ±1, disks overlap, the ground is tilted or cuts a disk, the
+    rotors are not of one kind, and as `free_wake` does.
 
     >>> import rotorjax as rj
     >>> pair = several_wakes(*rj.rotor("uh60"), [(0, 0, 0), (0, 0, -0.2)])
     >>> pair.slices, pair.senses.tolist()
     (1, [1.0, -1.0])
     """
+    if not isinstance(rotor, Rotor):
+        raise refuse(
+            "rotor", "be one rotor, the kind that all are of (collectives, thrusts and senses may differ)", shown(rotor)
+        )
     place = np.array(places, float)
     if place.ndim != 2 or place.shape[1] != 3 or len(place) < 2 or not np.all(np.isfinite(place)):
         raise refuse("places", "be finite and of shape (N, 3) for N >= 2 rotors", f"of shape {place.shape}")
@@ -114,12 +137,15 @@ def several_wakes(
         raise refuse("senses", f"hold {count} numbers, 1 (counter-clockwise) or -1", shown(senses))
     _check_apart(place)
     _check_ground(place, ground)
+    if surfaces is not None:
+        check_surfaces(surfaces, operating)
+        settings = among_settings() if settings is None else settings
     pitch = operating.collective * 180 / np.pi if collectives_deg is None else collectives_deg
     models = [
-        free_wake(rotor, _pitched(operating, angle), _under(ground, at), settings)
+        _over(free_wake(rotor, _pitched(operating, angle), _under(ground, at), settings), surfaces, at)
         for angle, at in zip(_each("collectives_deg", pitch, count), place, strict=True)
     ]
-    shared = np.ptp(place[:, :2]) == 0 and np.all(np.ptp(place[:, :2], axis=0) == 0)
+    shared = np.all(np.ptp(place[:, :2], axis=0) == 0) and surfaces is None
     return SeveralWakes(
         wakes=jax.tree.map(lambda *a: jnp.stack(a), *models),
         places=jnp.asarray(place),
@@ -127,6 +153,7 @@ def several_wakes(
         phases=_each("phases_deg", 0.0 if phases_deg is None else phases_deg, count) * (jnp.pi / 180),
         coupling=array(1.0),
         thrusts=None if thrusts is None else _thrusts(thrusts, count),
+        surfaces=None if surfaces is None else solid(surfaces, ground),
         slices=1 if shared else models[0].settings.azimuths,
     )
 
@@ -154,6 +181,15 @@ def _pitched(operating: OperatingPoint, degrees: Array) -> OperatingPoint:
 def _under(ground: Plane | None, place: np.ndarray) -> Plane | None:
     """The plane seen from a hub."""
     return None if ground is None else Plane(ground.height + place[2], ground.slope)
+
+
+def _over(model: FreeWake, surfaces: Panels | None, place: np.ndarray) -> FreeWake:
+    """A rotor's own model over its floor among surfaces. Raises InputError where they cut its disk."""
+    if surfaces is None:
+        return model
+    seen = surfaces.moved(-place)
+    check_clear(seen)
+    return replace(model, over=floor(seen, model.ground))
 
 
 def _check_apart(place: np.ndarray) -> None:
@@ -189,6 +225,8 @@ def evaluate(several: SeveralWakes, x: Unknowns) -> Evaluation:
     state, start = eqx.filter_vmap(full_state)(several.wakes, x)
     own = jax.lax.map(lambda one: node_velocities(*one), (several.wakes, state, several.phases))
     added = several.coupling * interference(several, state)
+    if several.surfaces is not None:
+        added = added + answer(several, state)
     ends = np.cumsum([own.control.shape[2], np.prod(own.near.shape[2:4])])
     parts = jnp.split(added, ends, axis=2)
     velocities = jax.tree.map(lambda v, more: v + more.reshape(v.shape), own, type(own)(*parts))
@@ -222,14 +260,14 @@ def _from_another(
 ) -> Float[Array, "K T 3"]:
     """Velocity at points of rotor i's slices from the wake of rotor j."""
     apart, turned = several.places[i] - several.places[j], several.senses[i] * several.senses[j]
-    angles = several.phases + 2 * jnp.pi / several.slices * jnp.arange(several.slices)[:, None]
-    at = to_hub(targets, angles[:, i], source.rotor.blades)
+    angles = several.angles
+    at = to_hub(targets, angles[i], source.rotor.blades)
     points = mirrored(at, turned) + mirrored(apart, several.senses[j])
     if several.slices == 1:
         flow = _mean_flow(source, jax.tree.map(lambda a: a[0], segments), points[0])[None]
     else:
-        flow = at_instants(source, segments, points, angles[:, j])
-    return from_hub(mirrored(flow, turned), angles[:, i], several.slices)
+        flow = at_instants(source, segments, points, angles[j])
+    return from_hub(mirrored(flow, turned), angles[i], several.slices)
 
 
 def _mean_flow(model: FreeWake, segments: Segments, points: Float[Array, "T 3"]) -> Float[Array, "T 3"]:
@@ -238,6 +276,39 @@ def _mean_flow(model: FreeWake, segments: Segments, points: Float[Array, "T 3"])
     copies = -(-COPIES // blades)
     weak = segments._replace(strength=segments.strength / copies)
     return segment_velocity(points, *weak, plane=model.ground, blades=blades * copies)
+
+
+def answer(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
+    """What the surfaces induce at each rotor's control points and nodes, in the frames of its slices, over ΩR."""
+    density = densities(several, eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases))
+    assert several.surfaces is not None
+    corners, share, ground = several.surfaces.panels.corners, several.surfaces.share, several.ground
+    blades = several.wakes.rotor.blades
+
+    def at(one: tuple[Array, Array, Array, Array]) -> Array:
+        targets, place, sense, angles = one
+        points = mirrored(to_hub(targets, angles, blades), sense) + place
+        flow = jax.lax.map(lambda both: share * panel_velocity(both[0], corners, both[1], ground), (points, density))
+        return from_hub(mirrored(flow, sense), angles, several.slices)
+
+    targets = eqx.filter_vmap(targets_of)(several.wakes, state)
+    return jax.lax.map(at, (targets, several.places, several.senses, several.angles))
+
+
+def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
+    """Source densities of the panels over ΩR at each instant, against the flow of all wakes and their images."""
+    surfaces, instants = several.surfaces, several.slices // several.wakes.rotor.blades
+    assert surfaces is not None
+    panels = surfaces.panels
+
+    def through(one: tuple[FreeWake, Segments, Array, Array, Array]) -> Array:
+        model, sources, place, sense, angles = one
+        at = jnp.broadcast_to(mirrored(panels.middles - place, sense), (instants, len(panels), 3))
+        return jnp.sum(mirrored(at_instants(model, sources, at, angles), sense) * panels.normals, axis=-1)
+
+    each = (several.wakes, segments, several.places, several.senses, several.angles)
+    blown = jnp.sum(jax.lax.map(through, each), axis=0)
+    return jax.lax.map(lambda one: surfaces.densities(one, several.ground), blown)
 
 
 def told(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation]:
@@ -272,14 +343,18 @@ def velocity(several: SeveralWakes, state: WakeState, points: Float[Array, "P 3"
     """Induced velocity over ΩR at points of the common frame (over R), mean over the instants of a blade's passage."""
     segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
 
-    def one(model: FreeWake, sources: Segments, place: Array, sense: Array, phase: Array) -> Array:
+    def one(model: FreeWake, sources: Segments, place: Array, sense: Array, angles: Array) -> Array:
         own = mirrored(points - place, sense)
         if several.slices == 1:
             return mirrored(_mean_flow(model, jax.tree.map(lambda a: a[0], sources), own), sense)
         instants = several.slices // model.rotor.blades
         at = jnp.broadcast_to(own, (instants, *own.shape))
-        angles = phase + 2 * jnp.pi / several.slices * jnp.arange(several.slices)
         return mirrored(jnp.mean(at_instants(model, sources, at, angles), axis=0), sense)
 
-    each = (several.wakes, segments, several.places, several.senses, several.phases)
-    return jnp.sum(jax.lax.map(lambda args: one(*args), each), axis=0)
+    each = (several.wakes, segments, several.places, several.senses, several.angles)
+    flow = jnp.sum(jax.lax.map(lambda args: one(*args), each), axis=0)
+    if several.surfaces is None:
+        return flow
+    mean = jnp.mean(densities(several, segments), axis=0)
+    corners, share = several.surfaces.panels.corners, several.surfaces.share
+    return flow + share * panel_velocity(points, corners, mean, several.ground)

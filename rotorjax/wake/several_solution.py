@@ -1,4 +1,6 @@
-"""Solving for several rotors in one free wake: each alone first, then in a growing share of the others' flow."""
+"""Solving for several rotors in one free wake: each alone over its floor, then all at once; where that is lost, in a
+growing share of the others' flow and of the surfaces'.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,11 +23,14 @@ from rotorjax.wake.equilibrium import METHOD, Evaluation, Unknowns, displacement
 from rotorjax.wake.model import WakeState
 from rotorjax.wake.performance import Performance
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
-from rotorjax.wake.search import Progress
+from rotorjax.wake.search import MOST_SLICES, Progress
 from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
 from rotorjax.wake.solution import Solution, readings, solve
 
 Number = Numbers = Any
+
+AT_ONCE = 8
+"""Newton iterations from wakes alone to wakes together: what takes more is found sooner by shares."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ def solve_several(
 
     start: a converged solution of as many like rotors. progress(stage, residual): called after each step. tol: relative
     rms of the residual. A search that does not get there comes back with `converged` False, why, and what it reached:
-    its `coupling` says at which share of the other rotors' flow it was lost.
+    its `coupling` says at which share of the other rotors' and the surfaces' flow it was lost.
 
     Raises InputError under tracing: there `performance_of` has the derivatives.
     """
@@ -101,30 +106,40 @@ def solve_several(
         )
     if start is not None and start.converged and _fits(start.model, several):
         x, linear = _unknowns(start), _method(several, _mean(start.state))
-        found = _newton(several, x, linear, tol)
+        found = _newton(several, x, linear, tol, MOST_SLICES)
         _tell(progress, "neighbour", found)
         if found.converged:
             return _read(several, found, found.iterations)
     alone, spent = _alone(several, progress, tol)
     if not all(one.converged for one in alone):
         return _read(_share(several, 0.0), _outcome(several, alone), spent)
-    linear = _method(several, alone[0].unknowns)
-    state = {"spent": spent}
+    x, linear = _outcome(several, alone).x, _method(several, alone[0].unknowns)
+    found = _newton(several, x, linear, tol, AT_ONCE)
+    _tell(progress, "together", found)
+    spent += found.iterations
+    if found.converged or found.interrupted:
+        return _read(several, found, spent)
+    return _by_shares(several, x, linear, spent, progress, tol)
+
+
+def _by_shares(
+    several: SeveralWakes, x: Together, linear: Krylov, spent: int, progress: Progress | None, tol: float
+) -> SeveralSolution:
+    """Follow the branch as the flow of the others and of the surfaces comes up from nothing."""
 
     def step(x: Together, share: float, _: Any) -> Outcome:
-        found = _newton(_share(several, share), x, linear, tol if share == 1 else max(tol, 1e-5))
+        nonlocal spent
+        found = _newton(_share(several, share), x, linear, tol if share == 1 else max(tol, 1e-5), MOST_SLICES)
         _tell(progress, f"together {share:.2f}", found)
-        state["spent"] += found.iterations
+        spent += found.iterations
         return found
 
-    branch = continuation(
-        step, _outcome(several, alone).x, 0.0, 1.0, step=0.5, largest=1.0, smallest=0.03, easy=5, jump=0.3
-    )
+    branch = continuation(step, x, 0.0, 1.0, step=0.5, largest=1.0, smallest=0.03, easy=5, jump=0.3)
     if not branch.outcomes:
         assert branch.failed is not None
-        return _read(_share(several, 0.0), replace(branch.failed, why=branch.why), state["spent"])
+        return _read(_share(several, 0.0), replace(branch.failed, why=branch.why), spent)
     found = branch.last if branch.reached else replace(branch.last, converged=False, why=f"together: {branch.why}")
-    return _read(_share(several, branch.parameters[-1]), found, state["spent"])
+    return _read(_share(several, branch.parameters[-1]), found, spent)
 
 
 def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Performance:
@@ -137,36 +152,40 @@ def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Performa
         raise InputError(f"Argument `solution` must be converged to have a derivative, but: {solution.why}")
     x = jax.tree.map(jnp.asarray, _unknowns(solution))
     with jax.ensure_compile_time_eval():  # the solution is at hand: nothing of this belongs into the caller's program
-        inverse = EachInverse(harmonic_inverse(solution.model.one(0), _mean(solution.state), several.slices))
+        inverse = EachInverse(harmonic_inverse(solution.model.one(0).levelled, _mean(solution.state), several.slices))
     x = attach(residual, x, several, method="gmres", precondition=lambda x, model: inverse)
     driven = with_collectives(several, x.collective)
     return loads_of(driven, evaluate(driven, x.wakes))
 
 
 def _fits(a: SeveralWakes, b: SeveralWakes) -> bool:
-    """Whether two models have as many rotors, blades and nodes."""
+    """Whether two models have as many rotors, blades and nodes, and both have ground or neither."""
     same = jax.tree.structure(a.wakes.settings) == jax.tree.structure(b.wakes.settings)
+    same = same and (a.ground is None) == (b.ground is None)
     return same and (len(a), a.slices, a.wakes.rotor.blades) == (len(b), b.slices, b.wakes.rotor.blades)
 
 
 def _share(several: SeveralWakes, coupling: float) -> SeveralWakes:
-    return eqx.tree_at(lambda s: s.coupling, several, jnp.asarray(coupling, several.places.dtype))
+    """Part of the others' flow, and of the answer of the surfaces."""
+    part = jnp.asarray(coupling, several.places.dtype)
+    several = eqx.tree_at(lambda s: s.coupling, several, part)
+    return several if several.surfaces is None else eqx.tree_at(lambda s: s.surfaces.share, several, part)
 
 
-def _newton(several: SeveralWakes, x: Together, linear: Krylov, tol: float) -> Outcome:
-    return newton(told, x, several, linear=linear, tol=tol, max_iterations=16)
+def _newton(several: SeveralWakes, x: Together, linear: Krylov, tol: float, most: int) -> Outcome:
+    return newton(told, x, several, linear=linear, tol=tol, max_iterations=most)
 
 
 def _method(several: SeveralWakes, alone: Unknowns) -> Krylov:
     """Newton's linear solver, helped by the inverse Jacobian of the first rotor alone, for each."""
-    return replace(METHOD, precondition=EachInverse(harmonic_inverse(several.one(0), alone, several.slices)))
+    return replace(METHOD, precondition=EachInverse(harmonic_inverse(several.one(0).levelled, alone, several.slices)))
 
 
 def _alone(several: SeveralWakes, progress: Progress | None, tol: float) -> tuple[list[Solution], int]:
-    """Each rotor's own wake; the next begins with the last one's."""
+    """Each rotor's own axisymmetric wake over its floor; the next begins with the last one's."""
     found: list[Solution] = []
     for i in range(len(several)):
-        found.append(solve(several.one(i), found[-1] if found else None, progress, tol))
+        found.append(solve(several.one(i).levelled, found[-1] if found else None, progress, tol))
         if not found[-1].converged:
             found += [found[-1]] * (len(several) - i - 1)
             break

@@ -72,6 +72,10 @@ def test_commands_take_them_alike(command, place, monkeypatch, tmp_path):
         ("trim --weight 72000 --thrust-coefficient 0.006", "not allowed"),
         ("trim --weight 72000 --density 1 --altitude 3", "not allowed"),
         ("trim", "one of the arguments"),
+        ("trim --weight 2e6", "must come to a C_T that is a number in (0, 0.1], but 2e+06 N comes to 0.159"),
+        ("trim --weight 72000 --speed 200", "200 m/s comes to 0.9058"),
+        ("trim --weight 72000 --wieght 3", "unknown argument --wieght: did you mean --weight"),
+        ("trim --weight 72000 --height 0.4 --inflow uniform", "but is 0.4: use vpbfsm or freewake"),
         ("linearise --out x --altitude 1000", "altitude"),
     ],
 )
