@@ -15,8 +15,10 @@ from jax import Array
 from rotorjax.device import on_cpu
 from rotorjax.wake.kernel_pairs import Vector, add, between, cross, dot, influence, loose_pairs, pairs, slopes, subtract
 
-PRODUCT_BLOCK = 112
-"""Most segments a step where the sum is a matrix product: from 76 to 200 it is as fast, with 800 points or 4000."""
+PRODUCT_PAIRS, PRODUCT_BLOCK = 170_000, 64
+"""Pairs a step where the sum is a matrix product, as many as the caches of two cores hold, and the segments that it has
+at least: few large steps leave few hand-overs between threads.
+"""
 
 AT_ONCE = 4096
 """Segments a step on an accelerator: with 20 000 points their pairs take .7 GB in double precision."""
@@ -81,7 +83,7 @@ def _by_products(settings: Settings, points: Array, segments: Segments) -> Array
     Written so, w × (x − s) is a difference of nearly equal numbers next to a segment: its relative error there is
     ε |x|/|x − s|, which a core of .01 keeps below 1e-13 of the largest velocity in double and 1e-4 in single precision.
     """
-    x, width = tuple(points), _even(segments, PRODUCT_BLOCK)
+    x, width = tuple(points), _even(segments, max(PRODUCT_BLOCK, PRODUCT_PAIRS // points.shape[1]))
     # an accelerator would round single precision to ten bits; asked to do so too, XLA's CPU back end takes four times
     # as long
     precision = None if on_cpu() else "highest"
