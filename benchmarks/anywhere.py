@@ -80,7 +80,9 @@ def flight(number: int, rng: np.random.Generator) -> dict[str, Any]:
 def hover(number: int, rng: np.random.Generator) -> dict[str, Any]:
     """A random hover over ground."""
     name, height = str(rng.choice(catalogue.names())), rng.uniform(0.4, 3.0)
-    steepest = next(d for d in np.arange(40.0, -0.1, -0.25) if float(plane(height, d).clearance) >= CLEAR)
+    slopes = np.arange(40.0, -0.1, -0.25)
+    clear = height * np.cos(np.deg2rad(slopes)) - np.sin(np.deg2rad(slopes)) >= CLEAR
+    steepest = slopes[clear][0]
     return {"rotor": name, "height": height, "slope_deg": rng.uniform(0.0, steepest), "share": rng.uniform(0.03, 1.2)}
 
 
