@@ -52,6 +52,10 @@ made at most. With so many combined, passes converge as Newton's method does, wh
 products with the Jacobian, each as dear as one or two passes.
 """
 
+BESIDE = 0.3
+"""The share from a neighbour, which is near: fewer passes by up to a quarter; from a prescribed wake it stalls for some.
+"""
+
 FEW, EASY = 100, 40
 """Passes after which a rough step is given up, and those of an easy one."""
 
@@ -183,21 +187,21 @@ class _Stages:
             self._progress(stage, outcome.residual)
         return outcome
 
-    def found(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+    def found(self, stage: str, z: InWake, p: WakeTrim, tol: float, share: float = SHARE) -> Outcome:
         """By passes of the fixed point, and at the case itself by Newton's method where these stall near it; from one
         hover to the next by Newton's alone.
         """
         if z.flap.shape[0] == 1:
             return self.newton(stage, z, p, min(tol, 1e-5), hard=False)
-        near = self.passes(stage, z, p, tol)
+        near = self.passes(stage, z, p, tol, share)
         if near.converged or near.interrupted or tol == ROUGH or near.residual > ROUGH:
             return near
         return self.newton(stage, near.x, p, tol, hard=False)
 
-    def passes(self, stage: str, z: InWake, p: WakeTrim, tol: float) -> Outcome:
+    def passes(self, stage: str, z: InWake, p: WakeTrim, tol: float, share: float = SHARE) -> Outcome:
         """Passes of the fixed point under Anderson's iteration."""
         most = FEW if tol == ROUGH else PASSES
-        return self.done(stage, anderson(passed, z, p, mixing=SHARE, window=WINDOW, tol=tol, max_iterations=most))
+        return self.done(stage, anderson(passed, z, p, mixing=share, window=WINDOW, tol=tol, max_iterations=most))
 
     def newton(self, stage: str, z: InWake, p: WakeTrim, tol: float, *, hard: bool = True) -> Outcome:
         """Newton-Krylov on wake, blades and controls together. hard: try the least steps; else shorten the way."""
@@ -220,7 +224,7 @@ def _from_neighbour(p: WakeTrim, near: TrimmedInWake, stages: _Stages) -> Trimme
         wind = (there - here) * (near.p.inputs.velocity - p.inputs.velocity)
         return z._replace(wake=carried(z.wake, p.model, wind))
 
-    branch = _follow("trim", at, near.z, 1.0, stages, carry=carry, smallest=NEAREST)
+    branch = _follow("trim", at, near.z, 1.0, stages, BESIDE, carry=carry, smallest=NEAREST)
     last = branch.last if branch.reached or branch.failed is None else branch.failed
     return TrimmedInWake(last.x, p, last if branch.reached else replace(last, converged=False), stages.iterations)
 
@@ -319,13 +323,21 @@ def _by_way_of_washout(thick: WakeTrim, controls, coning: float, stages: _Stages
 
 
 def _follow(
-    stage: str, at: Callable[[float], WakeTrim], x: InWake, first: float, stages: _Stages, **more: Any
+    stage: str,
+    at: Callable[[float], WakeTrim],
+    x: InWake,
+    first: float,
+    stages: _Stages,
+    share: float = SHARE,
+    **more: Any,
 ) -> Branch:
-    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL. more: of `continuation`."""
+    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL. share: of passes; more: of
+    `continuation`.
+    """
 
     def step(guess, s, memory):
         last = s == 1 and stage == "trim"
-        found = stages.found(stage, guess, at(s), TOL if last else ROUGH)
+        found = stages.found(stage, guess, at(s), TOL if last else ROUGH, share)
         if last and (stages.nearest is None or found.residual < stages.nearest.residual):
             stages.nearest = found
         return found
