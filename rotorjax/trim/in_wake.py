@@ -53,8 +53,7 @@ products with the Jacobian, each as dear as one or two passes.
 """
 
 BESIDE = 0.3
-"""The share from a neighbour, which is near: fewer passes by up to a quarter; from a prescribed wake it stalls for some.
-"""
+"""The share from a neighbour, which is near: up to a quarter fewer passes; from a prescribed wake some stall."""
 
 FEW, EASY = 100, 40
 """Passes after which a rough step is given up, and those of an easy one."""
