@@ -1,4 +1,4 @@
-"""Solid surfaces under both models: `python benchmarks/surfaces.py [--parts …] [--quick] [--json FILE] [--out DIR]`.
+"""Solid surfaces: `python benchmarks/surfaces.py [--parts …] [--models …] [--quick] [--json FILE] [--out DIR]`.
 
 Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
 theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
@@ -39,6 +39,8 @@ SETTINGS = {"panels": 10, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_tu
 SETTINGS |= {"tip_core": 0.05}
 COARSE = SETTINGS | {"panels": 8, "free_turns": 2.0, "closure_turns": 1, "closure_bundles": 2}
 PLACES = np.linspace(-1.5, 1.5, 13)
+MODELS = ("states", "wake")
+LOOKS = {"wake": ("free wake", FREE_WAKE), "states": ("finite states", VPBFSM)}
 DISTANCES = (1.2, 1.4, 1.7, 2.2, 3.0)
 HEIGHT = 1.0
 
@@ -194,47 +196,63 @@ def row_of(solved) -> dict:
     return row | {"converged": bool(solved.converged), "why": solved.why}
 
 
-def roof(quick: bool) -> list[dict]:
+def solved_by(models, surfaces, ground, quick, last=None) -> dict:
+    """The rotor solved by each model; last: a neighbour that the free wake starts from."""
+    ways = {
+        "states": lambda: states(surfaces, ground),
+        "wake": lambda: rj.solve(wake(surfaces, ground, quick), last),
+    }
+    return {name: ways[name]() for name in models}
+
+
+def told(name: str, place: dict, solved: dict, panels: int = 0) -> dict:
+    """A row of a place, printed: each model's numbers, what goes through the panels, what the search took."""
+    row = place | {model: row_of(one) for model, one in solved.items()}
+    if "wake" in solved:
+        row |= {"iterations": solved["wake"].found.iterations, "seconds": solved["wake"].found.wall_time_s}
+        row |= {"left": no_flow(solved["wake"]), "panels": panels} if panels else {}
+    print(json.dumps({name: row}), flush=True)
+    return row
+
+
+def neighbour(solved: dict, surfaces):
+    """What a free wake among as many panels may start from."""
+    found = solved.get("wake")
+    return found if found is not None and surfaces is not None and found.converged else None
+
+
+def roof(quick: bool, models=MODELS) -> list[dict]:
     """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive. The
     first two rows are free air and the whole ground.
     """
-    rows, last = [], None
-    for ground in (None, rj.plane(HEIGHT)):
-        rows.append(
-            {"wake": row_of(rj.solve(wake(ground=ground, quick=quick))), "states": row_of(states(ground=ground))}
-        )
-        print(json.dumps({"whole ground" if ground else "free air": rows[-1]}), flush=True)
-    house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.3 if quick else 0.25)
+    rows = [
+        told("roof", {"edge": edge}, solved_by(models, None, ground, quick))
+        for edge, ground in ((-np.inf, None), (np.inf, rj.plane(HEIGHT)))
+    ]
+    house_at_hub, last = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.3 if quick else 0.25), None
     for edge in PLACES[::-3] if quick else (3.0, *PLACES[::-1]):
         house = house_at_hub.moved((float(edge), 0, 0))
-        began = time.perf_counter()
-        solved = rj.solve(wake(house, quick=quick), last)
-        row = {"edge": float(edge), "wake": row_of(solved), "states": row_of(states(house)), "left": no_flow(solved)}
-        row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations, "panels": len(house)}
-        print(json.dumps({"roof": row}), flush=True)
-        rows.append(row)
-        last = solved if solved.converged else None
+        solved = solved_by(models, house, None, quick, last)
+        rows.append(told("roof", {"edge": float(edge)}, solved, len(house)))
+        last = neighbour(solved, house)
     return rows
 
 
-def hangar(quick: bool) -> tuple[list[dict], dict]:
+def hangar(quick: bool, models=MODELS) -> tuple[list[dict], dict]:
     """A rotor over ground beside a wall to starboard at each of DISTANCES; the first row is without. And, for the
-    picture, both models solved with it at 1.2 R.
+    picture, the models solved with it at the least distance.
     """
-    ground = rj.plane(HEIGHT)
-    near = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.25 if quick else 0.15)
+    near = rj.wall(DISTANCES[0], -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, panel=0.25 if quick else 0.15)
     rows, last, pictured = [], None, {}
     for distance in (np.inf, *(DISTANCES[::2] if quick else DISTANCES)):
-        wall = None if np.isinf(distance) else near.moved((0.0, distance - 1.2, 0.0))
-        solved, by_states = rj.solve(wake(wall, ground, quick), last), states(wall, ground)
-        row = {"distance": float(distance), "wake": row_of(solved), "states": row_of(by_states)}
-        row |= {"iterations": solved.found.iterations, "seconds": solved.found.wall_time_s}
-        if distance == 1.2:
-            row |= {"left": no_flow(solved), "panels": len(wall)} | at_the_wall(solved)
-            pictured = {"free wake": solved, "finite states": by_states}
-        print(json.dumps({"hangar": row}), flush=True)
-        rows.append(row)
-        last = solved if solved.converged and wall is not None else None
+        wall = None if np.isinf(distance) else near.moved((0.0, distance - DISTANCES[0], 0.0))
+        solved = solved_by(models, wall, rj.plane(HEIGHT), quick, last)
+        place = {"distance": float(distance)}
+        if distance == DISTANCES[0]:
+            pictured = solved
+            place |= at_the_wall(solved["wake"]) if "wake" in solved else {}
+        rows.append(told("hangar", place, solved, 0 if wall is None else len(wall)))
+        last = neighbour(solved, wall)
     return rows, pictured
 
 
@@ -252,33 +270,29 @@ def at_the_wall(solved) -> dict:
     return {"nodes_inside": float(inside.mean()), "through_face": float(left / wanted)}
 
 
-def curve(rows: list[dict], place: str, model: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Places and values of a model, where it was found."""
-    found = [(row[place], row[model][name]) for row in rows if row[model]["converged"]]
-    return tuple(np.array(found).T)
-
-
-def draw_over(rows: list[dict], alone: dict, place: str, label: str, moment: str, path: Path) -> tuple:
-    """Inflow over that in rows `alone`, and a hub moment, over the place of a surface, by both models."""
-    with style():
-        figure = new_figure(9.5, 4.2)
-        first, second = figure.subplots(1, 2)
-        for model, name, colour in (("wake", "free wake", FREE_WAKE), ("states", "finite states", VPBFSM)):
-            where, inflow = curve(rows, place, model, "inflow")
-            first.plot(where, inflow / alone[model]["inflow"], "o-", color=colour, label=name)
-            second.plot(*curve(rows, place, model, moment), "o-", color=colour, label=name)
-        first.set(xlabel=label, ylabel=r"$\lambda/\sqrt{C_T}$ over that without")
-        side = {"C_m": "load ahead", "C_l": "load to starboard"}[moment]
-        second.set(xlabel=label, ylabel=f"hub moment over $C_T$, {side}")
-    return figure, first, second, path
+def draw_over(rows: list[dict], alone: dict, place: str, label: str, moment: str) -> tuple:
+    """Inflow over that of the row `alone`, and a hub moment, over the place of a surface, by each model."""
+    figure = new_figure(9.5, 4.2)
+    first, second = figure.subplots(1, 2)
+    for model in alone.keys() & LOOKS.keys():
+        found = [row for row in rows if row[model]["converged"]]
+        where, (name, colour) = [row[place] for row in found], LOOKS[model]
+        ratio = [row[model]["inflow"] / alone[model]["inflow"] for row in found]
+        first.plot(where, ratio, "o-", color=colour, label=name)
+        second.plot(where, [row[model][moment] for row in found], "o-", color=colour, label=name)
+    first.set(xlabel=label, ylabel=r"$\lambda/\sqrt{C_T}$ over that without")
+    side = {"C_m": "load ahead", "C_l": "load to starboard"}[moment]
+    second.set(xlabel=label, ylabel=f"hub moment over $C_T R$, {side}")
+    return figure, first, second
 
 
 def draw_roof(rows: list[dict], path: Path) -> None:
     """Inflow and the pitching moment over the place of the edge, and the inflow over the whole ground."""
     air, whole, *places = rows
-    figure, first, second, path = draw_over(places, air, "edge", "edge of the roof aft of the hub, x/R", "C_m", path)
     with style():
-        for model, name, colour in (("wake", "free wake", FREE_WAKE), ("states", "finite states", VPBFSM)):
+        figure, first, second = draw_over(places, air, "edge", "edge of the roof aft of the hub, x/R", "C_m")
+        for model in air.keys() & LOOKS.keys():
+            name, colour = LOOKS[model]
             ratio = whole[model]["inflow"] / air[model]["inflow"]
             first.axhline(ratio, color=colour, linestyle=":", label=f"{name}, whole ground")
         legend_below(first, 2)
@@ -288,9 +302,8 @@ def draw_roof(rows: list[dict], path: Path) -> None:
 
 def draw_distance(rows: list[dict], path: Path) -> None:
     """Inflow and the rolling moment over the distance of the wall."""
-    open_ground, *walls = rows
-    figure, first, second, path = draw_over(walls, open_ground, "distance", "distance of the wall, y/R", "C_l", path)
     with style():
+        figure, first, second = draw_over(rows[1:], rows[0], "distance", "distance of the wall, y/R", "C_l")
         legend_below(first, 2)
         legend_below(second, 2)
     save_file(figure, path)
@@ -301,8 +314,10 @@ def draw_hangar(pictured: dict, path: Path) -> None:
     s, z = np.meshgrid(np.linspace(-2.5, 1.195, 75), np.linspace(-HEIGHT + 0.01, 1.2, 45))
     points = jnp.asarray(np.stack([0 * s, s, z], axis=-1).reshape(-1, 3))
     with style():
-        figure = new_figure(7.5, 7.4)
-        for axes, (name, solved) in zip(figure.subplots(2, 1), pictured.items(), strict=True):
+        figure = new_figure(7.5, 3.9 * len(pictured))
+        for axes, (name, solved) in zip(
+            figure.subplots(len(pictured), 1, squeeze=False)[:, 0], pictured.items(), strict=True
+        ):
             flow = np.asarray(rj.velocity(solved, points)).reshape(*s.shape, 3)
             speed, along = np.hypot(flow[..., 1], flow[..., 2]), (flow[..., 1], flow[..., 2])
             filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.09, 13), cmap="viridis", extend="max")
@@ -311,7 +326,7 @@ def draw_hangar(pictured: dict, path: Path) -> None:
             axes.fill_between([1.2, 1.7], -HEIGHT, 1.0, color="#7a5c3e")
             axes.axhline(-HEIGHT, color="#7a5c3e", linewidth=3)
             bounds = {"xlim": (-2.5, 1.7), "ylim": (-HEIGHT - 0.03, 1.2)}
-            axes.set(title=name, xlabel="to starboard, y/R", ylabel="z/R", aspect="equal", **bounds)
+            axes.set(title=LOOKS[name][0], xlabel="to starboard, y/R", ylabel="z/R", aspect="equal", **bounds)
             axes.grid(visible=False)
             figure.colorbar(filled, ax=axes, label=r"mean speed in the plane over $\Omega R$", shrink=0.8)
     save_file(figure, path)
@@ -386,6 +401,7 @@ PARTS = ("limits", "derivative", "cost", "roof", "hangar", "wind", "passing")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS, help="of roof and hangar")
     parser.add_argument("--quick", action="store_true", help="coarser wake, larger panels, fewer places")
     parser.add_argument("--json", type=Path, help="file for all numbers")
     parser.add_argument("--out", type=Path, help="folder for the pictures")
@@ -394,7 +410,8 @@ def main() -> None:
         chosen.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for part in chosen.parts:
-        found[part] = globals()[part](chosen.quick)
+        more = (chosen.models,) if part in ("roof", "hangar") else ()
+        found[part] = globals()[part](chosen.quick, *more)
         pictured = {}
         if part == "hangar":
             found[part], pictured = found[part]
