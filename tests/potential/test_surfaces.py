@@ -16,6 +16,7 @@ from rotorjax.potential.model import (
     disk_inflow,
     finite_state_model,
     steady_state,
+    unit_inflow,
     unit_states,
     velocity,
 )
@@ -117,13 +118,13 @@ def test_a_wall_far_away_changes_nothing():
 def test_derivatives_by_the_place_of_surfaces():
     """Compiled, many at once and in reverse, against differences: of a wall and of a deck whose shadow moves."""
     both = HANGAR + rj.slab((-3.0, -1.0), (0.3, 0.5), -0.5, 0.3, panel=0.8)
-    among = finite_state_model(GROUND, 0, 1, 1, 2, surfaces=both)
+    among = finite_state_model(GROUND, 0, 1, 1, 2, surfaces=both, wake=None)
     way = jnp.array([0.8, 0.5, 0.3])
 
     def inflow(by):
         solid = eqx.tree_at(lambda s: s.panels, among.surfaces, among.surfaces.panels.moved(by * way))
         here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, GROUND))
-        return disk_inflow(steady_state(here, TAU[:1]), X, Y, here) @ (X + Y) / jnp.sqrt(CT / 2)
+        return unit_inflow(here, unit_states(here), X, Y)[0] @ (X + Y)
 
     step = 1e-5
     value, slope = jax.jit(jax.vmap(jax.value_and_grad(inflow)))(0.02 + step * jnp.array([-1, 0, 1]))
