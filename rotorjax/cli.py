@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from rotorjax import __version__
-from rotorjax.errors import InputError
+from rotorjax.errors import ArgumentError, InputError
 
 DIVERGED, BAD_INPUT, FAULT, INTERRUPTED, CLOSED = 1, 2, 70, 130, 141
 # XLA's older way to write fused loops takes a third less to compile and as long to run, but for the derivative of the
@@ -61,13 +61,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 where a case did not converge; 2 for bad input, a full disk included; 70 for a fault of rotorjax itself; 130
     when interrupted; 141 where nobody reads what is printed any more.
     """
-    chosen = parsed(sys.argv[1:] if arguments is None else arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    chosen = parsed(given)
     programs = None
     try:
         programs = _set_up_jax("" if _solves_free_wake(chosen) else WITHOUT_FREE_WAKE)
         return chosen.run(chosen)
     except InputError as error:
-        return _left(chosen, BAD_INPUT, f"error: {' '.join(str(error).split())}")
+        return _left(chosen, BAD_INPUT, f"error: {' '.join(str(_by_option(error, given)).split())}")
     except KeyboardInterrupt:
         return _left(chosen, INTERRUPTED, "interrupted" + getattr(chosen, "kept", ""))
     except BrokenPipeError:
@@ -102,6 +103,15 @@ def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> N
     options = [option for action in parser._actions for option in action.option_strings if option.startswith("--")]
     near = difflib.get_close_matches(given.partition("=")[0][:100], options, n=1)
     parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
+
+
+def _by_option(error: InputError, given: Sequence[str]) -> InputError:
+    """A complaint about an argument under the option that gave it: `tilt_deg` is what --tilt says."""
+    if isinstance(error, ArgumentError):
+        named = "--" + error.name.removesuffix("_deg").replace("_", "-")
+        if any(argument.partition("=")[0] == named for argument in given):
+            return error.under(named)
+    return error
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:
