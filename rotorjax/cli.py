@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import os
+import re
 import signal
 import sys
 import traceback
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from rotorjax import __version__
-from rotorjax.errors import ArgumentError, InputError
+from rotorjax.errors import InputError
 
 DIVERGED, BAD_INPUT, FAULT, INTERRUPTED, CLOSED = 1, 2, 70, 130, 141
 # XLA's older way to write fused loops takes a third less to compile and as long to run, but for the derivative of the
@@ -68,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         programs = _set_up_jax("" if _solves_free_wake(chosen) else WITHOUT_FREE_WAKE)
         return chosen.run(chosen)
     except InputError as error:
-        return _left(chosen, BAD_INPUT, f"error: {' '.join(str(_by_option(error, given)).split())}")
+        return _left(chosen, BAD_INPUT, f"error: {_by_option(' '.join(str(error).split()), given)}")
     except KeyboardInterrupt:
         return _left(chosen, INTERRUPTED, "interrupted" + getattr(chosen, "kept", ""))
     except BrokenPipeError:
@@ -105,13 +106,15 @@ def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> N
     parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
 
 
-def _by_option(error: InputError, given: Sequence[str]) -> InputError:
+def _by_option(message: str, given: Sequence[str]) -> str:
     """A complaint about an argument under the option that gave it: `tilt_deg` is what --tilt says."""
-    if isinstance(error, ArgumentError):
-        named = "--" + error.name.removesuffix("_deg").replace("_", "-")
-        if any(argument.partition("=")[0] == named for argument in given):
-            return error.under(named)
-    return error
+    options = {argument.partition("=")[0] for argument in given if argument.startswith("--")}
+
+    def option(found: re.Match[str]) -> str:
+        name = "--" + found[1].removesuffix("_deg").replace("_", "-")
+        return next((one for one in (name, f"{name}s") if one in options), found[0])
+
+    return re.sub(r"Argument `(\w+)`", option, message)
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:
