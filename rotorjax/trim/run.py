@@ -112,6 +112,11 @@ def check(request: Request) -> None:
     check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
+        if request.tilt_deg:
+            raise InputError(
+                f"Argument `tilt_deg` must be left out with a drag_area, which the tilt balances, but is "
+                f"{request.tilt_deg:g}"
+            )
     if request.height is not None and request.climb:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), but is {request.climb:g}"
