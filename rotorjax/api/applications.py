@@ -200,13 +200,11 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
     values in `.fit`. Raises InputError for an unknown target and as they do.
     """
     from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher
-    from rotorjax.checks import closest
+    from rotorjax.checks import refuse_choice
 
     runs = {"hayden": hayden_run.run, "freewake": freewake_run.run, "wake": measured_run.run}
     if target not in runs:
-        raise InputError(
-            f"Argument `target` must be one of {', '.join(runs)}, but is '{target}': {closest(target, runs)}"
-        )
+        raise refuse_choice("target", target, runs)
     if target == "freewake" and data and isinstance(data[0], str | Path):
         data = (teacher.find_cases(data[0]), *data[1:])
     return runs[target](*data, **settings)
