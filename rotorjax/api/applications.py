@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from rotorjax.api.solved import Solved
 from rotorjax.errors import InputError
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from rotorjax.linearisation.handover import Time
     from rotorjax.ode.models import LinearModel, PeriodicModel
+    from rotorjax.simulation.linear_march import LinearMarch
     from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
     from rotorjax.sweep.case import SweepCase
@@ -158,11 +159,19 @@ def sweep(case: "str | Path | SweepCase", folder: str | Path, jobs: int = 1) -> 
     return dataset(sweep(wanted, folder, pool=None if jobs == 1 else lambda line: Processes(jobs, line.say)))
 
 
-def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) -> "March":
-    """Compile a march of a trim with any inflow, to be stepped inside a simulator's loop at a fixed cost.
+@overload
+def march(about: "Result", steps_per_turn: int | None = None, **options: Any) -> "March": ...
+@overload
+def march(about: "LinearModel | PeriodicModel", steps_per_turn: int | None = None) -> "LinearMarch": ...
+def march(
+    about: "Result | LinearModel | PeriodicModel", steps_per_turn: int | None = None, **options: Any
+) -> "March | LinearMarch":
+    """Compile a march of a trim with any inflow, or of its linear model, to be stepped inside a simulator's loop at a
+    fixed cost.
 
     steps_per_turn: of a revolution, None for what the inflow needs. options: of `simulation.march.march`: precision,
-    old_age, batch, bound_filter. Raises InputError where the steps are too few, with the number that is enough.
+    old_age, batch, bound_filter, surfaces; a linear model has none. Raises InputError where the steps are too few, with
+    the number that is enough, and for a linear model that is not of `rj.linearise`.
 
     >>> import rotorjax as rj
     >>> level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", advance=0.15)
@@ -170,9 +179,17 @@ def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) 
     >>> bool(marched.step(marched.start).y.CT > 0.005)
     True
     """
+    from rotorjax.ode.models import LinearModel, PeriodicModel
+
+    if isinstance(about, LinearModel | PeriodicModel):
+        from rotorjax.simulation.linear_march import linear_march
+
+        if options:
+            raise InputError(f"Argument `{next(iter(options))}` is of a march of the rotor: a linear model has none")
+        return linear_march(about, steps_per_turn)
     from rotorjax.simulation.march import march
 
-    return march(trimmed, steps_per_turn, **options)
+    return march(about, steps_per_turn, **options)
 
 
 def calibrate(target: str, *data: Any, **settings: Any) -> Any:
@@ -183,13 +200,11 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
     values in `.fit`. Raises InputError for an unknown target and as they do.
     """
     from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher
-    from rotorjax.checks import closest
+    from rotorjax.checks import refuse_choice
 
     runs = {"hayden": hayden_run.run, "freewake": freewake_run.run, "wake": measured_run.run}
     if target not in runs:
-        raise InputError(
-            f"Argument `target` must be one of {', '.join(runs)}, but is '{target}': {closest(target, runs)}"
-        )
+        raise refuse_choice("target", target, runs)
     if target == "freewake" and data and isinstance(data[0], str | Path):
         data = (teacher.find_cases(data[0]), *data[1:])
     return runs[target](*data, **settings)
