@@ -107,8 +107,10 @@ def velocity_potentials(
     above = np.array([pairs.index((m, n + 1)) for m, n in modes.pairs])
     below = np.array([pairs.index((m, n - 1)) if n > m else 0 for m, n in modes.pairs])
     column = (-1,) + (1,) * at.nu.ndim
-    up = np.array([sigma(m, n) for m, n in modes.pairs]).reshape(column)
-    down = np.array([zeta(m, n) if n > m else 0.0 for m, n in modes.pairs]).reshape(column)
+    up, down = (
+        jnp.asarray(factors, radial.dtype).reshape(column)
+        for factors in ([sigma(m, n) for m, n in modes.pairs], [zeta(m, n) if n > m else 0.0 for m, n in modes.pairs])
+    )
     rows = up * radial[above] + down * radial[below]
     for k, (m, n) in enumerate(modes.pairs):
         if n == m:
