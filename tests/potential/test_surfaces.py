@@ -69,7 +69,7 @@ def test_a_patch_of_the_ground_disks_size_is_the_ground_of_the_models_own_source
 
 
 def test_no_air_goes_through_a_panels_middle():
-    """The whole velocity there, its own panel's share the limit from the air; in the mean under the wake, whose rim is sharp."""
+    """The whole velocity there, a panel's own share the limit from the air; under the wake only in the mean."""
     house = HANGAR + rj.box((-0.5, -2.0, -1.0), (1.0, 0.4, -0.5), panel=0.5)
     among = model(GROUND, house)
     state, panels = steady_state(among, TAU), among.surfaces.panels
