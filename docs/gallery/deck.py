@@ -10,5 +10,5 @@ for one, names in zip(axes, shown, strict=True):
     for name in names:
         one.plot(data.time, data[name], "--" if "static" in name else "-", label=data[name].long_name)
     one.legend(fontsize=8)
-    one.set_ylabel(f"over {data[names[0]].units}")
+    one.set_ylabel(data[names[0]].units)
 axes[-1].set_xlabel("time, s")

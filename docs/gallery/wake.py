@@ -10,5 +10,4 @@ for blade, path in enumerate(tip_vortices(wake, 2)):
     axes.plot(*path.T, lw=1.5)
     axes.plot(*np.outer([0.1, 1.0], [(-1) ** blade, 0, 0]).T, "k", lw=4)
 axes.set(xlabel="x/R", ylabel="y/R", zlabel="z/R", box_aspect=(1, 1, 0.6))
-axes.set(xticks=[-1, 0, 1], yticks=[-1, 0, 1])
 axes.view_init(elev=18, azim=-60)
