@@ -15,6 +15,7 @@ from rotorjax.bench.single import check_case
 from rotorjax.errors import InputError
 from rotorjax.inflow.momentum import flight_state, induced_inflow
 from rotorjax.limits import TABLE, check_flight, check_place, markdown, of_the_instant, steady_thrusts
+from rotorjax.linearisation.rotor import base_of
 from rotorjax.potential.model import finite_state_model, mean_inflow
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.derived import derived, doubts, notes
@@ -158,6 +159,14 @@ def test_single_precision_trims_to_its_stated_tolerance():
     assert single["converged"], single["why"]
     np.testing.assert_allclose(single["collective_deg"], double["collective_deg"], rtol=2e-6)
     np.testing.assert_allclose(single["CP"], double["CP"], rtol=2e-5)
+
+
+def test_a_linearisation_asks_for_double_precision():
+    class Found:
+        z = jnp.zeros(2, jnp.float32)
+
+    with pytest.raises(InputError, match=r"`about` must be in double precision.*but is float32: .*jax_enable_x64"):
+        base_of(Found)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

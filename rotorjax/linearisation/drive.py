@@ -6,11 +6,14 @@ is exact to first order, inertia included. A sinusoidal one belongs to the inflo
 
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PyTree
 
+from rotorjax.checks import refuse
 from rotorjax.coupled import Coupled, CoupledRotor
 from rotorjax.errors import InputError
 from rotorjax.inflow.finite_state import FiniteStateInflow
@@ -85,6 +88,16 @@ def _slope(p: Coupled):
         return None if p.ground is None else lambda q: q.ground.slope
     finite = isinstance(p.inflow, FiniteStateInflow) and p.inflow.model.ground is not None
     return (lambda q: q.inflow.model.ground.slope) if finite else None
+
+
+def check_double(name: str, dtype: Any) -> None:
+    """Raise InputError in single precision, whose rounding would be most of a linearisation's differences."""
+    if dtype != np.float64:
+        raise refuse(
+            name,
+            "be in double precision, whose rounding a linearisation's differences need",
+            f'{dtype}: jax.config.update("jax_enable_x64", True) first',
+        )
 
 
 def check_names(what: str, wanted: Sequence[str] | None, allowed: Sequence[str], model: str) -> None:

@@ -60,8 +60,9 @@ def report(found: LinearFlight) -> str:
     gaps = (found.full_gap_db, found.full_gap_deg, small.gap_db, small.gap_deg)
     errors = pairs(found.full, small.gap_db, *gaps, 100 * found.step_error)
     sizes = ", ".join(f"{n} {steps.size_of(n):.3g} {u}" for n, u in zip(model.inputs, model.input_units, strict=True))
+    azimuths = "one azimuth" if model.t.size == 1 else f"{model.t.size} azimuths"
     return (
-        f"{model.order} states over {model.t.size} azimuths; time-invariant with {found.full.order} states ({held}); "
+        f"{model.order} states over {azimuths}; time-invariant with {found.full.order} states ({held}); "
         f"reduced to {small.model.order}, the blades' states as they are. Growth and frequency below are per radian of "
         "azimuth (1 is once per revolution), as seen from the hub.\n\n"
         + wake

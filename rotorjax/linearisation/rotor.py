@@ -22,7 +22,7 @@ from rotorjax.coupled_wake import CoupledWake
 from rotorjax.inflow.finite_state import FiniteStateInflow
 from rotorjax.inflow.pitt_peters import PittPeters
 from rotorjax.linearisation import drive, readings
-from rotorjax.linearisation.drive import Drive, check_names, drive_of, driven
+from rotorjax.linearisation.drive import Drive, check_double, check_names, drive_of, driven
 from rotorjax.ode.jacobian import value_and_jacobian
 from rotorjax.ode.labels import labels
 from rotorjax.ode.linearise import linearise
@@ -105,7 +105,11 @@ def _joint(z: tuple[SteadyState, Drive], psi: Array, p: Coupled) -> tuple[Steady
 
 
 def base_of(found: Trimmed | TrimmedInWake, nodes: int = AZIMUTHS) -> Base:
-    """A trim as it is linearised; nodes: azimuths of a revolution, where things change with it."""
+    """A trim as it is linearised; nodes: azimuths of a revolution, where things change with it.
+
+    Raises InputError for a trim in single precision.
+    """
+    check_double("about", jax.tree.leaves(found.z)[0].dtype)
     return _base_in_wake(found) if isinstance(found, TrimmedInWake) else _base_in_model(found, nodes)
 
 

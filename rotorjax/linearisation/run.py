@@ -11,6 +11,7 @@ from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.assembly import assemble
+from rotorjax.linearisation.drive import check_double
 from rotorjax.linearisation.marching import STEPS, Response, nonlinear_step, stable_steps
 from rotorjax.linearisation.reduce import Pair, reduce
 from rotorjax.linearisation.stages import Stages
@@ -59,11 +60,7 @@ def check(model: FreeWake, inputs: tuple[str, ...], outputs: tuple[str, ...], or
     """Raise InputError for unknown names, an order that the model does not have, or harmonics of what does not change,
     before anything is solved.
     """
-    if model.operating.omega.dtype != np.float64:
-        raise InputError(
-            "Argument `model` must be in double precision, whose rounding a linearisation's differences need, but is "
-            f'{model.operating.omega.dtype}: jax.config.update("jax_enable_x64", True) first'
-        )
+    check_double("model", model.operating.omega.dtype)
     check_names(model, inputs, outputs)
     tilted = model.ground is not None and float(model.ground.slope) != 0
     if harmonics < 0 or (harmonics > 0 and not tilted):
