@@ -64,7 +64,7 @@ def test_a_patch_of_the_ground_disks_size_is_the_ground_of_the_models_own_source
     """Both close the footprint alone: panels of constant density tend to the modes with their number."""
     own = unit_states(model(GROUND, wake=None, ground_radius=1.0)).up
     off = [jnp.abs(unit_states(model(None, round_patch(rings), wake=None)).up - own) for rings in (4, 8)]
-    assert bool(jnp.all(off[1][:3] < 0.5 * off[0][:3])), off
+    assert float(jnp.max(off[1][:3])) < 0.1 * float(jnp.max(off[0][:3])), off
     assert bool(jnp.all(off[1] < 0.015 * own[0])), (off, own)
 
 
