@@ -38,6 +38,7 @@ from rotorjax.trim.run import request
 from rotorjax.wake.far_wake import segment_ages
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.segments import lattice_segments
+from rotorjax.wake.settings import QUICK
 
 jax.config.update("jax_enable_x64", True)
 OMEGA, COUNT, IN_A_ROW = 27.0, 4000, 8
@@ -58,7 +59,7 @@ def case_of(flight, column=None, **options):
 
 
 FLIGHTS = {"hover": (0.0, 1.0, 0.0), "mu015": (0.15, None, 4.0)}
-QUICK = {"hover": {"panels": 12, "closure_turns": 1, "closure_bundles": 4}, "mu015": {"panels": 12}}
+COARSER = {"hover": QUICK, "mu015": {key: QUICK[key] for key in ("panels", "near_wake_deg")}}
 
 
 def pairs(p: CoupledWake) -> int:
@@ -185,7 +186,7 @@ def measured(name: str, library, chosen) -> dict[str, float]:
         ms, call, over = against_c(library, start, precision)
         figures |= {f"rhs_ms_{name}_{short}": ms, f"rhs_call_ms_{name}_{short}": call}
         figures[f"rhs_over_c_{name}_{short}"] = over
-    quick = start_of(case_of(FLIGHTS[name], wake=QUICK[name]), print)
+    quick = start_of(case_of(FLIGHTS[name], wake=COARSER[name]), print)
     for key, at in (("", start), ("_quick", quick)):
         figures[f"real_time_factor_{name}_f32{key}_two_steps"] = steps_per_second(
             at, chosen.turns, old_age="two steps"

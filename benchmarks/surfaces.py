@@ -1,8 +1,9 @@
-"""Solid surfaces under the free wake: `python benchmarks/surfaces.py [--parts …] [--quick] [--json FILE] [--out DIR]`.
+"""Solid surfaces: `python benchmarks/surfaces.py [--parts …] [--models …] [--quick] [--json FILE] [--out DIR]`.
 
 Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
 theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
-the edge of a roof a radius below it), hangar (one beside a wall at 1.2 R), wind (a UH-60 trimmed in a wind of 0.1 ΩR
+the edge of a roof a radius below it) and hangar (one beside a wall, over its distance), both by the finite states too,
+wind (a UH-60 trimmed in a wind of 0.1 ΩR
 over the edge of a roof), passing (one that flies over a roof at that speed, marched). The last two have small wakes
 (`TINY`), the others Knight and Hefner's two-bladed rotor at 8° with a wake that keeps all of it to minutes: three free
 turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
@@ -24,9 +25,6 @@ from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, legend_below, new_figure,
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
-from rotorjax.potential.ground_source import DiskQuadrature
-from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
-from rotorjax.region import half_plane
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.field import at_instants, velocity, wake_segments
@@ -41,6 +39,9 @@ SETTINGS = {"panels": 10, "age_step_deg": 20.0, "near_wake_deg": 100.0, "free_tu
 SETTINGS |= {"tip_core": 0.05}
 COARSE = SETTINGS | {"panels": 8, "free_turns": 2.0, "closure_turns": 1, "closure_bundles": 2}
 PLACES = np.linspace(-1.5, 1.5, 13)
+MODELS = ("states", "wake")
+LOOKS = {"wake": ("free wake", FREE_WAKE), "states": ("finite states", VPBFSM)}
+DISTANCES = (1.2, 1.4, 1.7, 2.2, 3.0)
 HEIGHT = 1.0
 
 
@@ -176,62 +177,83 @@ def cost(quick: bool) -> dict:
     return {"pairs": rows}
 
 
-def roof(quick: bool) -> list[dict]:
-    """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive."""
-    rows, last = [], None
-    alone, whole = (
-        float(one.mean_inflow / jnp.sqrt(one.CT))
-        for one in (rj.solve(wake(ground=ground, quick=quick)) for ground in (None, rj.plane(HEIGHT)))
-    )
-    print(json.dumps({"inflow over whole ground, over that in free air": whole / alone}), flush=True)
-    house_at_hub = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.3 if quick else 0.25)
-    for edge in (3.0, *PLACES[::-1]):
+def states(surfaces=None, ground=None):
+    """The same rotor by the finite states, which take the same surfaces."""
+    return rj.solve(rj.finite_state(*rj.rotor("knight_hefner_2", 8.0), ground, surfaces=surfaces))
+
+
+def row_of(solved) -> dict:
+    """Thrust, mean inflow over √C_T, its slopes along x and y over its mean, and hub moments over C_T."""
+    r, psi = np.asarray(solved.r), np.asarray(solved.psi)[:, None]
+    area = r**2 * np.asarray(solved.found.widths)
+    slopes = [
+        8 * float((np.asarray(solved.inflow) * wave * area).sum(axis=1).mean()) for wave in (np.cos(psi), np.sin(psi))
+    ]
+    thrust, mean = float(solved.CT), float(solved.mean_inflow)
+    c_l, c_m = moments(solved)
+    row = {"CT": thrust, "inflow": mean / np.sqrt(thrust), "C_l": c_l / thrust, "C_m": c_m / thrust}
+    row |= {"lambda_1c": slopes[0] / mean, "lambda_1s": slopes[1] / mean} if psi.size > 1 else {}
+    return row | {"converged": bool(solved.converged), "why": solved.why}
+
+
+def solved_by(models, surfaces, ground, quick, last=None) -> dict:
+    """The rotor solved by each model; last: a neighbour that the free wake starts from."""
+    ways = {
+        "states": lambda: states(surfaces, ground),
+        "wake": lambda: rj.solve(wake(surfaces, ground, quick), last),
+    }
+    return {name: ways[name]() for name in models}
+
+
+def told(name: str, place: dict, solved: dict, panels: int = 0) -> dict:
+    """A row of a place, printed: each model's numbers, what goes through the panels, what the search took."""
+    row = place | {model: row_of(one) for model, one in solved.items()}
+    if "wake" in solved:
+        row |= {"iterations": solved["wake"].found.iterations, "seconds": solved["wake"].found.wall_time_s}
+        row |= {"left": no_flow(solved["wake"]), "panels": panels} if panels else {}
+    print(json.dumps({name: row}), flush=True)
+    return row
+
+
+def neighbour(solved: dict, surfaces):
+    """What a free wake among as many panels may start from."""
+    found = solved.get("wake")
+    return found if found is not None and surfaces is not None and found.converged else None
+
+
+def roof(quick: bool, models=MODELS) -> list[dict]:
+    """A rotor a radius above a roof whose edge lies at x = edge aft of the hub; over it where that is positive. The
+    first two rows are free air and the whole ground.
+    """
+    rows = [
+        told("roof", {"edge": edge}, solved_by(models, None, ground, quick))
+        for edge, ground in ((-np.inf, None), (np.inf, rj.plane(HEIGHT)))
+    ]
+    house_at_hub, last = rj.slab((-6, -3), (0, 3), -HEIGHT, 1.0, 0.3 if quick else 0.25), None
+    for edge in PLACES[::-3] if quick else (3.0, *PLACES[::-1]):
         house = house_at_hub.moved((float(edge), 0, 0))
-        began = time.perf_counter()
-        solved = rj.solve(wake(house, quick=quick), last)
-        c_l, c_m = moments(solved)
-        row = {"edge": float(edge), "CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
-        row["inflow_ratio"] = float(solved.mean_inflow / jnp.sqrt(solved.CT)) / alone
-        row["whole_ground"] = whole / alone
-        row |= {"converged": bool(solved.converged), "why": solved.why, "left": no_flow(solved), "panels": len(house)}
-        row |= {"seconds": time.perf_counter() - began, "iterations": solved.found.iterations}
-        print(json.dumps({"roof": row}), flush=True)
-        rows.append(row)
-        last = solved if solved.converged else None
+        solved = solved_by(models, house, None, quick, last)
+        rows.append(told("roof", {"edge": float(edge)}, solved, len(house)))
+        last = neighbour(solved, house)
     return rows
 
 
-def of_finite_states(thrust: float) -> np.ndarray:
-    """Mean inflow over √(C_T/2) at each of PLACES by the finite states, and without a roof."""
-    settings = {"ground_harmonics": 6, "ground_radial_terms": 5, "ground_parity": "odd", "harmonics": 1}
-    flow = finite_state_model(
-        rj.plane(HEIGHT), quadrature=DiskQuadrature(24, 32), region=half_plane(0.0), ground_radius=2.0, **settings
-    )
-    tau = jnp.zeros(len(flow.modes)).at[0].set(np.sqrt(3) / 4 * thrust)
-
-    @eqx.filter_jit
-    def one(place):
-        here = eqx.tree_at(lambda m: m.region.edge, flow, place)
-        return mean_inflow(steady_state(here, tau), here)
-
-    return np.array([float(one(jnp.asarray(e))) for e in (*PLACES, -60.0)])
-
-
-def hangar(quick: bool) -> tuple[dict, object]:
-    """A rotor over ground beside a wall that stands 1.2 R to starboard; and without the wall."""
-    ground = rj.plane(HEIGHT)
-    wall = rj.wall(1.2, -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, thickness=0.5, panel=0.25 if quick else 0.15)
-    rows = {}
-    for name, surfaces in (("open", None), ("wall", wall)):
-        solved = rj.solve(wake(surfaces, ground, quick))
-        c_l, c_m = moments(solved)
-        rows[name] = {"CT": float(solved.CT), "inflow": float(solved.mean_inflow), "C_l": c_l, "C_m": c_m}
-        rows[name] |= {"converged": bool(solved.converged), "why": solved.why, "iterations": solved.found.iterations}
-        rows[name] |= {"seconds": solved.found.wall_time_s}
-        if surfaces is not None:
-            rows[name] |= {"left": no_flow(solved), "panels": len(surfaces)} | at_the_wall(solved)
-        print(json.dumps({name: rows[name]}), flush=True)
-    return rows, solved
+def hangar(quick: bool, models=MODELS) -> tuple[list[dict], dict]:
+    """A rotor over ground beside a wall to starboard at each of DISTANCES; the first row is without. And, for the
+    picture, the models solved with it at the least distance.
+    """
+    near = rj.wall(DISTANCES[0], -HEIGHT, 1.0, length=4.0, azimuth_deg=90.0, panel=0.25 if quick else 0.15)
+    rows, last, pictured = [], None, {}
+    for distance in (np.inf, *(DISTANCES[::2] if quick else DISTANCES)):
+        wall = None if np.isinf(distance) else near.moved((0.0, distance - DISTANCES[0], 0.0))
+        solved = solved_by(models, wall, rj.plane(HEIGHT), quick, last)
+        place = {"distance": float(distance)}
+        if distance == DISTANCES[0]:
+            pictured = solved
+            place |= at_the_wall(solved["wake"]) if "wake" in solved else {}
+        rows.append(told("hangar", place, solved, 0 if wall is None else len(wall)))
+        last = neighbour(solved, wall)
+    return rows, pictured
 
 
 def at_the_wall(solved) -> dict:
@@ -248,48 +270,65 @@ def at_the_wall(solved) -> dict:
     return {"nodes_inside": float(inside.mean()), "through_face": float(left / wanted)}
 
 
+def draw_over(rows: list[dict], alone: dict, place: str, label: str, moment: str) -> tuple:
+    """Inflow over that of the row `alone`, and a hub moment, over the place of a surface, by each model."""
+    figure = new_figure(9.5, 4.2)
+    first, second = figure.subplots(1, 2)
+    for model in alone.keys() & LOOKS.keys():
+        found = [row for row in rows if row[model]["converged"]]
+        where, (name, colour) = [row[place] for row in found], LOOKS[model]
+        ratio = [row[model]["inflow"] / alone[model]["inflow"] for row in found]
+        first.plot(where, ratio, "o-", color=colour, label=name)
+        second.plot(where, [row[model][moment] for row in found], "o-", color=colour, label=name)
+    first.set(xlabel=label, ylabel=r"$\lambda/\sqrt{C_T}$ over that without")
+    side = {"C_m": "load ahead", "C_l": "load to starboard"}[moment]
+    second.set(xlabel=label, ylabel=f"hub moment over $C_T R$, {side}")
+    return figure, first, second
+
+
 def draw_roof(rows: list[dict], path: Path) -> None:
-    """Inflow, thrust and moments over the place of the edge."""
-    edge = np.array([row["edge"] for row in rows])
-    ok = np.array([row["converged"] for row in rows])
-    ratio = np.array([row["inflow_ratio"] for row in rows])
-    states = of_finite_states(float(rows[-1]["CT"]))
+    """Inflow and the pitching moment over the place of the edge, and the inflow over the whole ground."""
+    air, whole, *places = rows
     with style():
-        figure = new_figure(9.5, 4.2)
-        first, second = figure.subplots(1, 2)
-        first.plot(edge[ok], ratio[ok], "o-", color=FREE_WAKE, label="free wake, panels")
-        first.axhline(rows[0]["whole_ground"], color=FREE_WAKE, linestyle=":", label="free wake, whole ground")
-        first.plot(PLACES, states[:-1] / states[-1], color=VPBFSM, label="finite states, region")
-        first.set(xlabel="edge of the roof aft of the hub, x/R", ylabel=r"$\lambda/\sqrt{C_T}$ over that without roof")
+        figure, first, second = draw_over(places, air, "edge", "edge of the roof aft of the hub, x/R", "C_m")
+        for model in air.keys() & LOOKS.keys():
+            name, colour = LOOKS[model]
+            ratio = whole[model]["inflow"] / air[model]["inflow"]
+            first.axhline(ratio, color=colour, linestyle=":", label=f"{name}, whole ground")
         legend_below(first, 2)
-        for name, label in (("C_l", "roll: load to starboard"), ("C_m", "pitch: load ahead")):
-            second.plot(
-                edge[ok], [row[name] / row["CT"] for row, good in zip(rows, ok, strict=True) if good], "o-", label=label
-            )
-        second.set(xlabel="edge of the roof aft of the hub, x/R", ylabel="hub moment over $C_T$")
         legend_below(second, 2)
     save_file(figure, path)
 
 
-def draw_hangar(solved, path: Path) -> None:
-    """Mean flow in the upright plane through shaft and wall."""
-    s, z = np.meshgrid(np.linspace(-2.5, 1.195, 75), np.linspace(-HEIGHT + 0.01, 1.2, 45))
-    points = np.stack([0 * s, s, z], axis=-1).reshape(-1, 3)
-    flow = np.asarray(rj.velocity(solved, jnp.asarray(points))).reshape(*s.shape, 3)
+def draw_distance(rows: list[dict], path: Path) -> None:
+    """Inflow and the rolling moment over the distance of the wall."""
     with style():
-        figure = new_figure(7.5, 4.0)
-        axes = figure.add_subplot()
-        speed = np.hypot(flow[..., 1], flow[..., 2])
-        filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.09, 13), cmap="viridis", extend="max")
-        axes.streamplot(
-            s[0], z[:, 0], flow[..., 1], flow[..., 2], color="white", linewidth=0.5, arrowsize=0.6, density=1.4
-        )
-        axes.plot([-1, 1], [0, 0], color="black", linewidth=2.5)
-        axes.fill_between([1.2, 1.7], -HEIGHT, 1.0, color="#7a5c3e")
-        axes.axhline(-HEIGHT, color="#7a5c3e", linewidth=3)
-        axes.set(xlabel="to starboard, y/R", ylabel="z/R", aspect="equal", xlim=(-2.5, 1.7), ylim=(-HEIGHT - 0.03, 1.2))
-        axes.grid(visible=False)
-        figure.colorbar(filled, ax=axes, label=r"mean speed in the plane over $\Omega R$", shrink=0.8)
+        figure, first, second = draw_over(rows[1:], rows[0], "distance", "distance of the wall, y/R", "C_l")
+        legend_below(first, 2)
+        legend_below(second, 2)
+    save_file(figure, path)
+
+
+def draw_hangar(pictured: dict, path: Path) -> None:
+    """Mean flow of both models in the upright plane through shaft and wall."""
+    s, z = np.meshgrid(np.linspace(-2.5, 1.195, 75), np.linspace(-HEIGHT + 0.01, 1.2, 45))
+    points = jnp.asarray(np.stack([0 * s, s, z], axis=-1).reshape(-1, 3))
+    with style():
+        figure = new_figure(7.5, 3.9 * len(pictured))
+        for axes, (name, solved) in zip(
+            figure.subplots(len(pictured), 1, squeeze=False)[:, 0], pictured.items(), strict=True
+        ):
+            flow = np.asarray(rj.velocity(solved, points)).reshape(*s.shape, 3)
+            speed, along = np.hypot(flow[..., 1], flow[..., 2]), (flow[..., 1], flow[..., 2])
+            filled = axes.contourf(s, z, speed, levels=np.linspace(0, 0.09, 13), cmap="viridis", extend="max")
+            axes.streamplot(s[0], z[:, 0], *along, color="white", linewidth=0.5, arrowsize=0.6, density=1.4)
+            axes.plot([-1, 1], [0, 0], color="black", linewidth=2.5)
+            axes.fill_between([1.2, 1.7], -HEIGHT, 1.0, color="#7a5c3e")
+            axes.axhline(-HEIGHT, color="#7a5c3e", linewidth=3)
+            bounds = {"xlim": (-2.5, 1.7), "ylim": (-HEIGHT - 0.03, 1.2)}
+            axes.set(title=LOOKS[name][0], xlabel="to starboard, y/R", ylabel="z/R", aspect="equal", **bounds)
+            axes.grid(visible=False)
+            figure.colorbar(filled, ax=axes, label=r"mean speed in the plane over $\Omega R$", shrink=0.8)
     save_file(figure, path)
 
 
@@ -362,25 +401,35 @@ PARTS = ("limits", "derivative", "cost", "roof", "hangar", "wind", "passing")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=MODELS, help="of roof and hangar")
     parser.add_argument("--quick", action="store_true", help="coarser wake, larger panels, fewer places")
     parser.add_argument("--json", type=Path, help="file for all numbers")
-    parser.add_argument("--out", type=Path, help="folder for roof.png and hangar.png")
+    parser.add_argument("--out", type=Path, help="folder for the pictures")
     chosen = parser.parse_args()
+    if chosen.out is not None:
+        chosen.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for part in chosen.parts:
-        found[part] = globals()[part](chosen.quick)
+        more = (chosen.models,) if part in ("roof", "hangar") else ()
+        found[part] = globals()[part](chosen.quick, *more)
+        pictured = {}
         if part == "hangar":
-            found[part], solved = found[part]
-        if chosen.out is not None and part == "passing":
-            chosen.out.mkdir(parents=True, exist_ok=True)
-            draw_passing(found[part], chosen.out / "passing.png")
-        if chosen.out is not None and part in ("roof", "hangar"):
-            chosen.out.mkdir(parents=True, exist_ok=True)
-            draw_roof(found[part], chosen.out / "roof.png") if part == "roof" else draw_hangar(
-                solved, chosen.out / "hangar.png"
-            )
-    if chosen.json is not None:
-        chosen.json.write_text(json.dumps(found, indent=1))
+            found[part], pictured = found[part]
+        if chosen.json is not None:
+            chosen.json.write_text(json.dumps(found, indent=1))
+        if chosen.out is not None:
+            draw(part, found[part], pictured, chosen.out)
+
+
+def draw(part: str, rows, pictured: dict, out: Path) -> None:
+    """The pictures of a part, if it has some."""
+    if part == "passing":
+        draw_passing(rows, out / "passing.png")
+    if part == "roof":
+        draw_roof(rows, out / "roof.png")
+    if part == "hangar":
+        draw_distance(rows, out / "hangar_distance.png")
+        draw_hangar(pictured, out / "hangar.png")
 
 
 if __name__ == "__main__":

@@ -74,6 +74,13 @@ def closest(word: str, allowed: Iterable[str]) -> str:
     return f"did you mean '{near[0]}'?" if near else "it must be one of " + ", ".join(allowed)
 
 
+def refuse_choice(name: str, found: object, allowed: Iterable[str]) -> InputError:
+    """The error for a word that is none of those allowed, for the caller to raise."""
+    near = difflib.get_close_matches(str(found)[:100], allowed := list(allowed), n=1)
+    meant = f": did you mean '{near[0]}'?" if near else ""
+    return refuse(name, f"be one of {', '.join(allowed)}", shown(found) + meant)
+
+
 def refuse(name: str, rule: str, found: str) -> InputError:
     """Make the error ``Argument `name` must rule, but is found``, for the caller to raise."""
     return ArgumentError(name, rule, found)

@@ -3,6 +3,7 @@
 import argparse
 import difflib
 import os
+import re
 import signal
 import sys
 import traceback
@@ -61,13 +62,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 where a case did not converge; 2 for bad input, a full disk included; 70 for a fault of rotorjax itself; 130
     when interrupted; 141 where nobody reads what is printed any more.
     """
-    chosen = parsed(sys.argv[1:] if arguments is None else arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    chosen = parsed(given)
     programs = None
     try:
         programs = _set_up_jax("" if _solves_free_wake(chosen) else WITHOUT_FREE_WAKE)
         return chosen.run(chosen)
     except InputError as error:
-        return _left(chosen, BAD_INPUT, f"error: {' '.join(str(error).split())}")
+        return _left(chosen, BAD_INPUT, f"error: {_by_option(' '.join(str(error).split()), given)}")
     except KeyboardInterrupt:
         return _left(chosen, INTERRUPTED, "interrupted" + getattr(chosen, "kept", ""))
     except BrokenPipeError:
@@ -102,6 +104,17 @@ def _refuse_unknown(top: argparse.ArgumentParser, command: str, given: str) -> N
     options = [option for action in parser._actions for option in action.option_strings if option.startswith("--")]
     near = difflib.get_close_matches(given.partition("=")[0][:100], options, n=1)
     parser.error(f"unknown argument {given[:60]}" + (f": did you mean {near[0]}?" if near else ""))
+
+
+def _by_option(message: str, given: Sequence[str]) -> str:
+    """A complaint about an argument under the option that gave it: `tilt_deg` is what --tilt says."""
+    options = {argument.partition("=")[0] for argument in given if argument.startswith("--")}
+
+    def option(found: re.Match[str]) -> str:
+        name = "--" + found[1].removesuffix("_deg").replace("_", "-")
+        return next((one for one in (name, f"{name}s") if one in options), found[0])
+
+    return re.sub(r"Argument `(\w+)`", option, message)
 
 
 def _left(chosen: argparse.Namespace, code: int, message: str) -> int:

@@ -6,7 +6,8 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import Range, array, check_range
+from rotorjax.checks import Range, array, check_range, known
+from rotorjax.errors import InputError
 
 RANGES = {
     "omega": Range(0.0, 21_000.0, "rad/s", above=True, hint="a clockwise rotor has its sense in `rotation`"),
@@ -103,3 +104,12 @@ def standard_air(altitude: float) -> Air:
     density = 101_325 / (gas * 288.15) * (temperature / 288.15) ** (9.80665 / (0.0065 * gas) - 1)
     dynamic = 1.458e-6 * temperature**1.5 / (temperature + 110.4)
     return Air(density, (1.4 * gas * temperature) ** 0.5, dynamic / density)
+
+
+def check_still(operating: OperatingPoint) -> None:
+    """Raise InputError where a rotor climbs, which over ground or past surfaces it cannot steadily."""
+    if known(operating.climb) and float(operating.climb) != 0:
+        raise InputError(
+            "Argument `operating` must not climb over ground or surfaces (a steady state needs a fixed height), "
+            f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground and surfaces out"
+        )

@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).parent.parent / "rotorjax"
 FLOORS = (  # from the ground up; a room may import from lower floors, and from earlier rooms of its own
     ("errors", "checks", "device", "frames", "io"),
     ("ground", "region", "operating", "ode"),
-    ("rotor", "potential", "panels"),
+    ("rotor", "panels", "potential"),
     ("inflow", "wake", "reference"),
     ("limits",),
     ("coupled_wake", "coupled"),

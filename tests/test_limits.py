@@ -17,7 +17,7 @@ from rotorjax.inflow.momentum import flight_state, induced_inflow
 from rotorjax.limits import TABLE, check_flight, check_place, markdown, of_the_instant, steady_thrusts
 from rotorjax.potential.model import finite_state_model, mean_inflow
 from rotorjax.rotor import catalogue
-from rotorjax.rotor.derived import derived, notes
+from rotorjax.rotor.derived import derived, doubts, notes
 from rotorjax.simulation.output import vortex_ring
 from rotorjax.trim.run import check, figure_of_merit, numbers, request, run
 
@@ -122,6 +122,19 @@ def test_derived_numbers_are_the_published_ones():
     assert 7 < found.lock < 11
     assert notes(rotor) == []
     assert "without a damper" in notes(catalogue.load("elliott_althoff")[0])[0]
+
+
+def test_numbers_of_a_wrong_unit_are_doubted_by_name():
+    """Slugs and feet, km/h, radians a second, grams; none of the catalogue's rotors."""
+    assert all(doubts(*catalogue.load(name)) == [] for name in catalogue.names())
+    changes = {
+        "density": {"operating": {"density": 0.002377}},
+        "sound_speed": {"operating": {"sound_speed": 1225.0}},
+        "tip Mach": {"operating": {"rpm": 27.0}},
+        "first_moment/blade_mass": {"hinge": {"blade_mass": 1e5}},
+    }
+    for what, changed in changes.items():
+        assert what in " ".join(doubts(*catalogue.load("uh60", changed)))
 
 
 def test_seconds_in_the_vortex_ring():

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from rotorjax.api.solved import Solved
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
+from rotorjax.wake.model import FreeWake
 from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
@@ -15,10 +16,11 @@ if TYPE_CHECKING:
 
     from rotorjax.linearisation.handover import Time
     from rotorjax.ode.models import LinearModel, PeriodicModel
+    from rotorjax.simulation.linear_march import LinearMarch
     from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
     from rotorjax.sweep.case import SweepCase
-    from rotorjax.trim.run import Result
+    from rotorjax.trim.run import Request, Result
 
 Progress = Callable[[str, float], None]
 
@@ -66,29 +68,15 @@ def linearise(
     """
     from rotorjax.linearisation.compact import reduced
     from rotorjax.linearisation.handover import handed_over
-    from rotorjax.linearisation.rotor import base_of, linear_rotor
-    from rotorjax.linearisation.system import linear_wake
-    from rotorjax.linearisation.wake_flight import periodic_in_wake
     from rotorjax.ode.harmonic import harmonic_model
     from rotorjax.trim.run import Result
     from rotorjax.trim.solve import Trimmed
 
-    def named(names: Sequence[str] | None) -> tuple[str, ...] | None:
-        return None if names is None else tuple(names)
-
-    if isinstance(about, Solved) and isinstance(about.found, Solution):
-        periodic, flown = linear_wake(about.found, named(inputs), named(outputs)), about.model
-    elif isinstance(about, Result) and isinstance(about.trimmed, Trimmed):
-        periodic, flown = linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
-    elif isinstance(about, Result) and not about.request.advance:
-        model = _hovering(about, named(inputs), named(outputs), harmonics, order)
+    inputs, outputs = (None if names is None else tuple(names) for names in (inputs, outputs))
+    if isinstance(about, Result) and not isinstance(about.trimmed, Trimmed) and not about.request.advance:
+        model = _hovering(about, inputs, outputs, harmonics, order)
         return handed_over(model, about.request.rotor, about.request.operating, time)
-    elif isinstance(about, Result):
-        periodic, flown = periodic_in_wake(about, named(inputs), named(outputs)), about.request
-    else:
-        raise InputError(
-            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, but is neither"
-        )
+    periodic, flown = _periodic(about, inputs, outputs)
     if harmonics is None:
         if order is not None:
             raise InputError(f"Argument `order` must be left out of a periodic model (harmonics None), but is {order}")
@@ -96,6 +84,27 @@ def linearise(
     model = harmonic_model(periodic, tuple(harmonics))
     model = model if order is None else reduced(model, order)
     return handed_over(model, flown.rotor, flown.operating, time)
+
+
+def _periodic(
+    about: "Solved | Result", inputs: tuple[str, ...] | None, outputs: tuple[str, ...] | None
+) -> "tuple[PeriodicModel, FreeWake | Request]":
+    """The model that is periodic in azimuth, and what flies. Raises InputError for anything that has none."""
+    from rotorjax.linearisation.rotor import base_of, linear_rotor
+    from rotorjax.linearisation.system import linear_wake
+    from rotorjax.linearisation.wake_flight import periodic_in_wake
+    from rotorjax.trim.run import Result
+    from rotorjax.trim.solve import Trimmed
+
+    if isinstance(about, Solved) and isinstance(about.found, Solution):
+        return linear_wake(about.found, inputs, outputs), about.found.model
+    if not isinstance(about, Result):
+        raise InputError(
+            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, but is neither"
+        )
+    if isinstance(about.trimmed, Trimmed):
+        return linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
+    return periodic_in_wake(about, inputs, outputs), about.request
 
 
 def _hovering(
@@ -150,11 +159,19 @@ def sweep(case: "str | Path | SweepCase", folder: str | Path, jobs: int = 1) -> 
     return dataset(sweep(wanted, folder, pool=None if jobs == 1 else lambda line: Processes(jobs, line.say)))
 
 
-def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) -> "March":
-    """Compile a march of a trim with any inflow, to be stepped inside a simulator's loop at a fixed cost.
+@overload
+def march(about: "Result", steps_per_turn: int | None = None, **options: Any) -> "March": ...
+@overload
+def march(about: "LinearModel | PeriodicModel", steps_per_turn: int | None = None) -> "LinearMarch": ...
+def march(
+    about: "Result | LinearModel | PeriodicModel", steps_per_turn: int | None = None, **options: Any
+) -> "March | LinearMarch":
+    """Compile a march of a trim with any inflow, or of its linear model, to be stepped inside a simulator's loop at a
+    fixed cost.
 
     steps_per_turn: of a revolution, None for what the inflow needs. options: of `simulation.march.march`: precision,
-    old_age, batch, bound_filter. Raises InputError where the steps are too few, with the number that is enough.
+    old_age, batch, bound_filter, surfaces; a linear model has none. Raises InputError where the steps are too few, with
+    the number that is enough, and for a linear model that is not of `rj.linearise`.
 
     >>> import rotorjax as rj
     >>> level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", advance=0.15)
@@ -162,9 +179,17 @@ def march(trimmed: "Result", steps_per_turn: int | None = None, **options: Any) 
     >>> bool(marched.step(marched.start).y.CT > 0.005)
     True
     """
+    from rotorjax.ode.models import LinearModel, PeriodicModel
+
+    if isinstance(about, LinearModel | PeriodicModel):
+        from rotorjax.simulation.linear_march import linear_march
+
+        if options:
+            raise InputError(f"Argument `{next(iter(options))}` is of a march of the rotor: a linear model has none")
+        return linear_march(about, steps_per_turn)
     from rotorjax.simulation.march import march
 
-    return march(trimmed, steps_per_turn, **options)
+    return march(about, steps_per_turn, **options)
 
 
 def calibrate(target: str, *data: Any, **settings: Any) -> Any:
@@ -175,13 +200,11 @@ def calibrate(target: str, *data: Any, **settings: Any) -> Any:
     values in `.fit`. Raises InputError for an unknown target and as they do.
     """
     from rotorjax.calibration import freewake_run, hayden_run, measured_run, teacher
-    from rotorjax.checks import closest
+    from rotorjax.checks import refuse_choice
 
     runs = {"hayden": hayden_run.run, "freewake": freewake_run.run, "wake": measured_run.run}
     if target not in runs:
-        raise InputError(
-            f"Argument `target` must be one of {', '.join(runs)}, but is '{target}': {closest(target, runs)}"
-        )
+        raise refuse_choice("target", target, runs)
     if target == "freewake" and data and isinstance(data[0], str | Path):
         data = (teacher.find_cases(data[0]), *data[1:])
     return runs[target](*data, **settings)

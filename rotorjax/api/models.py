@@ -1,7 +1,6 @@
 """A rotor, and the two models of the inflow that it makes."""
 
 from pathlib import Path
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,10 +9,15 @@ from jaxtyping import Array, ArrayLike, Float
 from rotorjax.checks import array
 from rotorjax.ground import Plane
 from rotorjax.inflow.balance import Stations, stations_of
-from rotorjax.operating import OperatingPoint
+from rotorjax.operating import OperatingPoint, check_still
+from rotorjax.panels.surface import Panels, Solid
 from rotorjax.potential.model import FiniteStateModel, finite_state_model
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
+
+SIZES = ("ground_harmonics", "ground_radial_terms")
+IN_SHADOW = (6, 5)
+"""Of the ground's sources beside surfaces: what the rim of a shadow on the ground needs."""
 
 
 class FiniteState(eqx.Module):
@@ -27,6 +31,11 @@ class FiniteState(eqx.Module):
     def ground(self) -> Plane | None:
         """The ground under it."""
         return self.flow.ground
+
+    @property
+    def surfaces(self) -> Solid | None:
+        """The surfaces beside and under it."""
+        return self.flow.surfaces
 
     @property
     def stations(self) -> Stations:
@@ -61,12 +70,26 @@ def rotor(
 
 
 def finite_state(
-    rotor: Rotor, operating: OperatingPoint, ground: Plane | None = None, harmonics: int = 1, **settings
+    rotor: Rotor,
+    operating: OperatingPoint,
+    ground: Plane | None = None,
+    harmonics: int = 1,
+    surfaces: Panels | None = None,
+    **settings,
 ) -> FiniteState:
-    """Make the finite-state model (VPBFSM) of a rotor, in or out of ground effect.
+    """Make the finite-state model (VPBFSM) of a rotor, in or out of ground effect, beside and above solid surfaces.
 
-    harmonics: highest harmonic of loading and ground sources, which a slope needs. settings: of
-    `potential.model.finite_state_model`. Raises InputError as that does.
+    harmonics: highest harmonic of loading and ground sources, which a slope needs. surfaces: as in `free_wake`; ground
+    beside them must be level, and its sources are as many as `IN_SHADOW` says. settings: of
+    `potential.model.finite_state_model`. Raises InputError as that does and where the rotor climbs past surfaces.
+
+    >>> import rotorjax as rj
+    >>> roof = rj.slab((-3.0, -2.0), (3.0, 2.0), top=-0.7, panel=0.6)
+    >>> over, free = (rj.solve(rj.finite_state(*rj.rotor("uh60", 18.0), surfaces=s)) for s in (roof, None))
+    >>> bool(over.CT > free.CT)
+    True
     """
-    sizes: dict[str, Any] = {"ground_harmonics": harmonics, "ground_radial_terms": 7}
-    return FiniteState(rotor, operating, finite_state_model(ground, harmonics, **sizes | settings))
+    if surfaces is not None:
+        check_still(operating)
+    sizes = dict(zip(SIZES, (harmonics, 7) if surfaces is None else IN_SHADOW, strict=True))
+    return FiniteState(rotor, operating, finite_state_model(ground, harmonics, surfaces=surfaces, **sizes | settings))

@@ -72,7 +72,7 @@ class Solved(eqx.Module):
         import xarray as xr
 
         around = ("azimuth", "radius")
-        surfaces = self.model.surfaces if isinstance(self.model, FreeWake) else None
+        surfaces = self.model.surfaces
         panels = 0 if surfaces is None else len(surfaces.panels)
         data = xr.Dataset(
             {

@@ -104,7 +104,7 @@ def settings_of(
     if harmonics != int(harmonics) or not 1 <= harmonics <= 4:
         raise InputError(f"Argument `harmonics` must be a whole number from 1 to 4, but is {harmonics}")
     if collective_deg is not None:
-        check_number("collective", collective_deg, -90.0, 90.0)
+        check_number("collective", collective_deg, -45.0, 45.0)
         operating = eqx.tree_at(lambda o: o.collective, operating, jnp.deg2rad(jnp.asarray(collective_deg, float)))
     if climb_ratio:
         operating = eqx.tree_at(lambda o: o.climb, operating, climb_ratio * operating.tip_speed(body.radius))

@@ -79,11 +79,11 @@ def case_of(chosen: argparse.Namespace) -> "Case":
 
 
 def introduce(rotor: "Rotor", operating: "OperatingPoint", moves: bool = False, about: Sequence[str] = ()) -> None:
-    """The rotor's derived numbers at the top of a run, and on stderr notes on blades that move, and about more."""
-    from rotorjax.rotor.derived import describe, notes
+    """The rotor's derived numbers at the top of a run, and on stderr doubts of them, notes on moving blades, more."""
+    from rotorjax.rotor.derived import describe, doubts, notes
 
     print(describe(rotor, operating))
-    for note in (*(notes(rotor) if moves else ()), *about):
+    for note in (*doubts(rotor, operating), *(notes(rotor) if moves else ()), *about):
         print(f"note: {note}", file=sys.stderr)
 
 

@@ -63,7 +63,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     from rotorjax.trim.run import Result
 
     usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
-    _refuse(chosen, usual, "belongs to a free wake, or to one of rigid blades")
+    _refuse(chosen, usual, "a trim finds the collective, and --quick is for a free wake")
     wanted, requests = _wanted(chosen), _requests(chosen)
     for request in requests:
         flight.check(request, wanted)
@@ -140,7 +140,7 @@ def _refuse(chosen: argparse.Namespace, usual: dict, why: str) -> None:
 
     for name, value in usual.items():
         if getattr(chosen, name) != value:
-            raise InputError(f"Argument `{name}` must be left out, but is given: it {why}")
+            raise InputError(f"Argument `{name}` must be left out, but is given: {why}")
 
 
 def _wake(chosen: argparse.Namespace) -> int:
@@ -181,7 +181,7 @@ def _only_the_wake(chosen: argparse.Namespace) -> None:
     from rotorjax.errors import InputError
 
     usual = {"advance_ratio": None, "speed": None, "altitude": None, "density": None, "tilt": 0.0, "azimuths": None}
-    _refuse(chosen, usual, "needs a trim: give --thrust-coefficient or --weight")
+    _refuse(chosen, usual, "it needs a trim: give --thrust-coefficient or --weight")
     if chosen.inflow not in (None, "freewake"):
         raise InputError(
             f"Argument `thrust_coefficient` or `weight` must be given with inflow '{chosen.inflow}', but neither is: "

@@ -42,7 +42,9 @@ def run(chosen: argparse.Namespace) -> int:
 
     case = read_case(chosen.case)
     if chosen.real_time and case.request.inflow != FREE_WAKE:
-        raise InputError(f'Argument `--real-time` must come with inflow = "{FREE_WAKE}", but: {case.request.inflow}')
+        raise InputError(
+            f'--real-time must come with inflow = "{FREE_WAKE}" in [flight], but it is "{case.request.inflow}"'
+        )
     out = make_folder(chosen.out)
     pace = Pace(print) if chosen.real_time else None
     introduce(case.request.rotor, case.request.operating, moves=True)

@@ -2,8 +2,12 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotorjax.commands.arguments import add_flight
+
+if TYPE_CHECKING:
+    from rotorjax.trim.run import Request, Result
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -36,12 +40,34 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 def run(chosen: argparse.Namespace) -> int:
     """Trim and print; the exit code."""
+    from rotorjax.commands.arguments import introduce_flights
+    from rotorjax.io.atomic import write_json
+    from rotorjax.trim.curve import curve
+    from rotorjax.trim.run import numbers, table
+
+    wanted, free = _asked(chosen)
+    introduce_flights(wanted)
+    results = curve([*wanted, *free])
+    points, alone = results[: len(wanted)], results[-1] if free else None
+    found = [numbers(result) for result in points]
+    print("\n\n".join(table(one) for one in found))
+    if chosen.json is not None:
+        write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
+    _draw(chosen, points, alone)
+    return 0 if all(one["converged"] for one in found) else 1
+
+
+def _asked(chosen: argparse.Namespace) -> "tuple[list[Request], list[Request]]":
+    """The trims asked for and, where a curve over heights is drawn, the one in free air beside it.
+
+    Raises InputError before any work, also where a file cannot be written or a picture would have one point.
+    """
     from rotorjax.bench.single_output import check_picture
-    from rotorjax.commands.arguments import flown, introduce_flights
+    from rotorjax.commands.arguments import flown
     from rotorjax.errors import InputError
-    from rotorjax.io.atomic import check_output, write_json
-    from rotorjax.trim.curve import curve, requests
-    from rotorjax.trim.run import numbers, request, table
+    from rotorjax.io.atomic import check_output
+    from rotorjax.trim.curve import requests
+    from rotorjax.trim.run import request
 
     base = request(
         rotor=chosen.rotor,
@@ -62,14 +88,11 @@ def run(chosen: argparse.Namespace) -> int:
     for path in (chosen.json, chosen.plot, chosen.html):
         check_output(path)
     pictured = chosen.plot is not None or chosen.html is not None
-    free = [*requests(base, speeds, [None])] if pictured and len(heights) > 1 else []
-    introduce_flights(wanted)
-    results = curve([*wanted, *free])
-    found = [numbers(result) for result in results[: len(wanted)]]
-    print("\n\n".join(table(one) for one in found))
-    if chosen.json is not None:
-        write_json(chosen.json, found[0] if len(found) == 1 else {"points": found})
-    points, alone = results[: len(wanted)], results[-1] if free else None
+    return wanted, requests(base, speeds, [None]) if pictured and len(heights) > 1 else []
+
+
+def _draw(chosen: argparse.Namespace, points: "list[Result]", alone: "Result | None") -> None:
+    """The picture and the page that are asked for."""
     if chosen.plot is not None:
         from rotorjax.bench.plotting import save_file  # matplotlib takes half a second to load
         from rotorjax.trim.curve_picture import draw
@@ -79,4 +102,3 @@ def run(chosen: argparse.Namespace) -> int:
         from rotorjax.trim.report import write_report
 
         write_report(chosen.html, points, alone)
-    return 0 if all(one["converged"] for one in found) else 1

@@ -161,31 +161,10 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
     field = jnp.tensordot(history.states.a[frames], own, 1) - jnp.tensordot(out.ground[frames], answer, 1)
     left = _residuals(model, history, kept, frames)
     seconds = np.asarray(history.psi) / case.omega
-
-    def series(values: Array, unit: str, text: str) -> tuple:
-        return "time", np.asarray(values), {"units": unit, "long_name": text}
-
-    flapping = {
-        f"{kind}beta_{n}": series(jnp.rad2deg(getattr(values, f"beta_{n}")), "deg", FLAPPING[n] + more)
-        for kind, values, more in (("", out, ""), ("static_", steady, ", steady at each instant"))
-        for n in ([] if case.rigid else FLAPPING)
-    }
     return xr.Dataset(
         {
-            "height": series(kept.ground.height, "R", "hub over deck"),
-            "slope": series(jnp.rad2deg(kept.ground.slope), "deg", "slope of the deck, rising aft"),
-            "edge": series(kept.edge, "R", "edge of the deck, positive aft of the hub"),
+            **_series(kept, out, steady, flapping=not case.rigid),
             "has_edge": float(case.edge is not None),
-            "climb": series(kept.climb, "ΩR", "climb of the hub"),
-            "collective": series(jnp.rad2deg(kept.collective), "deg", "collective pitch"),
-            "uniform": series(out.uniform, "ΩR", "mean inflow"),
-            "cosine": series(out.cosine, "ΩR", "fore-and-aft inflow, positive aft"),
-            "sine": series(out.sine, "ΩR", "lateral inflow, positive to starboard"),
-            "thrust": series(out.thrust, "-", "thrust coefficient"),
-            "static_uniform": series(steady.uniform, "ΩR", "mean inflow, steady at each instant"),
-            "static_cosine": series(steady.cosine, "ΩR", "fore-and-aft inflow, steady at each instant"),
-            "static_thrust": series(steady.thrust, "-", "thrust coefficient, steady at each instant"),
-            **flapping,
             "inflow": (("frame", "psi", "r"), np.asarray(field), {"units": "ΩR"}),
             "ground_residual": ("frame", np.asarray(left), {"units": "-", "long_name": "left on the deck, rms"}),
             "frame_time": ("frame", seconds[frames], {"units": "s"}),
@@ -198,6 +177,29 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
             "collective_deg": float(np.rad2deg(case.collective[0])),
         },
     )
+
+
+def _series(kept: Controls, out: Output, steady: Output, flapping: bool) -> dict[str, tuple]:
+    """Variables of time: what was prescribed and what came of it, marched and steady at each instant."""
+    now = ", steady at each instant"
+    rows = [
+        ("height", kept.ground.height, "R", "hub over deck"),
+        ("slope", jnp.rad2deg(kept.ground.slope), "deg", "slope of the deck, rising aft"),
+        ("edge", kept.edge, "R", "edge of the deck, positive aft of the hub"),
+        ("climb", kept.climb, "ΩR", "climb of the hub"),
+        ("collective", jnp.rad2deg(kept.collective), "deg", "collective pitch"),
+        ("uniform", out.uniform, "ΩR", "mean inflow"),
+        ("cosine", out.cosine, "ΩR", "fore-and-aft inflow, positive aft"),
+        ("sine", out.sine, "ΩR", "lateral inflow, positive to starboard"),
+        ("thrust", out.thrust, "-", "thrust coefficient"),
+        ("static_uniform", steady.uniform, "ΩR", "mean inflow" + now),
+        ("static_cosine", steady.cosine, "ΩR", "fore-and-aft inflow" + now),
+        ("static_thrust", steady.thrust, "-", "thrust coefficient" + now),
+    ]
+    for kind, values, more in (("", out, ""), ("static_", steady, now)) if flapping else ():
+        angles = {n: jnp.rad2deg(getattr(values, f"beta_{n}")) for n in FLAPPING}
+        rows += [(f"{kind}beta_{n}", angle, "deg", FLAPPING[n] + more) for n, angle in angles.items()]
+    return {name: ("time", np.asarray(v), {"units": unit, "long_name": text}) for name, v, unit, text in rows}
 
 
 def _residuals(model: OverGround, history: History, kept: Controls, frames: np.ndarray) -> Float[Array, " F"]:

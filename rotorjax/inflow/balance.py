@@ -91,7 +91,7 @@ def axial_state(
     tau, climb, hover = sign * tau, sign * climb, jnp.sqrt(jnp.abs(thrust) / 2)
     windmill = climb <= VORTEX_RING[0] * hover
     state = steady_state(model, tau, jnp.where(windmill, 0.0, climb), unit)
-    if model.ground is None:
+    if model.ground is None and model.surfaces is None:
         inner = jnp.sqrt(jnp.where(windmill, climb**2 / 4 - hover**2, 1.0))  # |V_c|/2 − v
         through, varying = inner - climb / 2, 2 * inner
         braked = tau / jnp.where(model.varying, varying, through)

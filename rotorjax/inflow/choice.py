@@ -2,7 +2,7 @@
 
 from typing import Literal, get_args
 
-from rotorjax.checks import closest
+from rotorjax.checks import refuse_choice
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.inflow.finite_state import finite_state
@@ -24,9 +24,7 @@ def inflow_model(name: str, ground: Plane | None = None) -> InflowModel:
     half a radius.
     """
     if name not in NAMES:
-        raise InputError(
-            f"Argument `inflow` must be one of {', '.join(NAMES)}, but is '{name}': {closest(name, NAMES)}"
-        )
+        raise refuse_choice("inflow", name, NAMES)
     if name == "vpbfsm":
         return finite_state(ground)
     if ground is not None:

@@ -36,6 +36,8 @@ def read_text(path: str | Path) -> str:
     try:
         return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
+        if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise InputError(f"{path}: the file must be text in UTF-8, but is UTF-16: save it as UTF-8") from None
         line = content[: error.start].count(b"\n") + 1
         raise InputError(
             f"{path}: the file must be text in UTF-8, but byte {content[error.start]:#04x} in line {line} is not"

@@ -95,7 +95,8 @@ def _checked(data: dict[str, Any], schema: Schema, optional: tuple[str, ...]) ->
             raise InputError(f"[{table}] must be a table, but is {shown(values)}")
     for table, keys in schema.items():
         if table not in (*data, *optional) and any(key.required for key in keys.values()):
-            raise InputError(f"table [{table}] is missing; it must hold {', '.join(keys)}")
+            needed = ", ".join(name for name, key in keys.items() if key.required)
+            raise InputError(f"table [{table}] is missing; it must hold {needed}")
     return {table: _checked_table(table, data.get(table, {}), keys) for table, keys in schema.items() if table in data}
 
 

@@ -65,9 +65,7 @@ def linearise(
     Raises InputError where the orbit has not converged, a name is unknown, or rhs returns another structure than the
     state's.
     """
-    require_converged(orbit)
-    times = orbit.t if nodes is None else orbit.t[0] + orbit.period * jnp.linspace(0, 1, nodes, endpoint=False)
-    states = orbit.x if nodes is None else orbit.at(times)
+    times, states = _sampled(orbit, nodes)
     start = jax.tree.map(lambda leaf: leaf[0], states)
     u, p = traceable((u, p))
     slope, result = eqx.filter_eval_shape(lambda *a: (rhs(*a), output(*a)), times[0], start, u, p)
@@ -83,10 +81,7 @@ def linearise(
     if derivative is None:
         whole, values = _sweep(joint, z, times, (flat_u, p), rows, chunk, progress)
     else:
-        columns = np.concatenate([np.arange(n), n + chosen])
-        pairs = [derivative(t, jax.tree.map(lambda leaf, k=k: leaf[k], states)) for k, t in enumerate(times)]
-        whole = np.stack([jacobian[np.ix_(rows, columns)] for _, jacobian in pairs])
-        values = np.stack([value[rows] for value, _ in pairs])
+        whole, values = _given(derivative, times, states, rows, np.concatenate([np.arange(n), n + chosen]))
     names, outs = tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept)
     return PeriodicModel(
         t=np.asarray(times),
@@ -105,6 +100,24 @@ def linearise(
         u=np.asarray(flat_u)[chosen],
         y=values[:, n:],
     )
+
+
+def _sampled(orbit: Orbit, nodes: int | None) -> tuple[Array, PyTree]:
+    """Times and states of a converged orbit, its own or interpolated."""
+    require_converged(orbit)
+    if nodes is None:
+        return orbit.t, orbit.x
+    times = orbit.t[0] + orbit.period * jnp.linspace(0, 1, nodes, endpoint=False)
+    return times, orbit.at(times)
+
+
+def _given(
+    derivative: Derivative, times: Array, states: PyTree, rows: np.ndarray, columns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Chosen rows and columns of the caller's Jacobian, and of its value, at every time."""
+    pairs = [derivative(t, jax.tree.map(lambda leaf, k=k: leaf[k], states)) for k, t in enumerate(times)]
+    whole = np.stack([jacobian[np.ix_(rows, columns)] for _, jacobian in pairs])
+    return whole, np.stack([value[rows] for value, _ in pairs])
 
 
 def _sweep(

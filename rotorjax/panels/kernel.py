@@ -106,10 +106,16 @@ def normal_velocities(
     return jax.lax.map(lambda one: at(*one), (points, normals), batch_size=64)
 
 
+def solid_angles(points: Float[Array, "N 3"], corners: Float[Array, "P 4 3"]) -> Float[Array, "N P"]:
+    """Solid angle that each point sees each panel under, negative from behind."""
+    panels = frames(corners)
+    return jax.lax.map(lambda point: _of_unit_density(point[:, None], panels)[2][:, 0], points, batch_size=64)
+
+
 @jax.jit
 def seen(point: Float[Array, "3"], corners: Float[Array, "P 4 3"]) -> Float[Array, ""]:
-    """Solid angle that a point sees panels under, negative from behind: −4π inside a closed surface, 0 outside it."""
-    return jnp.sum(_of_unit_density(point[:, None], frames(corners))[2])
+    """Solid angle that a point sees a surface under: −4π inside a closed one, 0 outside it."""
+    return jnp.sum(solid_angles(point[None], corners))
 
 
 def _of_unit_density(points: Float[Array, "3 N"], panels: Frames) -> tuple[Array, Array, Array]:

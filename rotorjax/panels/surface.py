@@ -20,7 +20,7 @@ from jax import Array
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import ArrayLike, Float
 
-from rotorjax.checks import array, known
+from rotorjax.checks import array, known, refuse, shown
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.panels.kernel import normal_velocities, panel_velocity, seen
@@ -208,6 +208,12 @@ def _checked(surfaces: Panels, ground: Plane | None) -> Panels:
             "make the panels larger"
         )
     return surfaces
+
+
+def check_panels(surfaces: object) -> None:
+    """Raise InputError for what is no surface."""
+    if not isinstance(surfaces, Panels):
+        raise refuse("surfaces", "be made by rj.box, slab, wall, terrain or read_stl", shown(surfaces))
 
 
 def check_clear(surfaces: Panels) -> None:

@@ -21,6 +21,7 @@ distance.
 
 from collections.abc import Callable
 from math import sqrt
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -77,21 +78,49 @@ def contraction(radius: float = MOMENTUM, length: float = LENGTH, clearance: flo
     return Contraction(*(jnp.asarray(v, float) for v in (radius, length, clearance)))
 
 
+class Copies(NamedTuple):
+    """Cylinders that make up the near flow without A, K of them: scale, below: the k-th one's velocity at a point p is
+    C((p + below ẑ)/scale); weight: of it.
+    """
+
+    scale: Float[Array, " K"]
+    below: Float[Array, " K"]
+    weight: Float[Array, " K"]
+
+
+def _copies(wake: Contraction) -> Copies:
+    """The cylinder itself, then what each step takes away and puts in its place."""
+    done = np.arange(STEPS + 1) / STEPS  # share of the contraction
+    rho, middle = 1 - (1 - wake.radius) * done, (done[1:] + done[:-1]) / 2
+    depth, one = -wake.length * np.log1p(-middle), jnp.ones(1)
+    return Copies(
+        jnp.concatenate([one, rho[1:], rho[:-1]]),
+        jnp.concatenate([0 * one, depth, depth]),
+        jnp.concatenate([one, rho[1:] ** -2, -(rho[:-1] ** -2)]),
+    )
+
+
+def _each(
+    functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], copies: Copies
+) -> Float[Array, "... K"]:
+    """Flow of each copy without its weight, the copies last, behind the points."""
+    shape = (-1,) + (1,) * points.ndim
+    moved = (points + copies.below.reshape(shape) * np.array([0.0, 0.0, 1.0])) / copies.scale.reshape(shape)
+    return jnp.moveaxis(functions(modes, moved), -points.ndim, -1)
+
+
+def _summed(parts: Float[Array, "... K"], modes: ModeTable, points: Array, weight: Array) -> Float[Array, "..."]:
+    """Odd modes as the copies make them up; even ones, which bear no load, as in the cylinder, which comes first."""
+    odd = jnp.asarray(modes.odd).reshape((-1,) + (1,) * (points.ndim - 1))
+    return jnp.where(odd, jnp.sum(parts * weight, axis=-1), parts[..., 0])
+
+
 def _tube(
     functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
 ) -> Float[Array, "..."]:
-    """The near flow without A, for odd modes; even ones, which bear no load, as in the cylinder."""
-    done = np.arange(STEPS + 1) / STEPS  # share of the contraction
-    rho, middle = 1 - (1 - wake.radius) * done, (done[1:] + done[:-1]) / 2
-    depth = -wake.length * np.log1p(-middle)
-    scale = jnp.concatenate([jnp.ones(1), rho[1:], rho[:-1]])
-    below = jnp.concatenate([jnp.zeros(1), depth, depth])
-    weight = jnp.concatenate([jnp.ones(1), rho[1:] ** -2, -(rho[:-1] ** -2)])
-    shape = (-1,) + (1,) * points.ndim
-    moved = (points + below.reshape(shape) * np.array([0.0, 0.0, 1.0])) / scale.reshape(shape)
-    parts = jnp.moveaxis(functions(modes, moved), -points.ndim, -1)  # the parts last, behind the points
-    odd = jnp.asarray(modes.odd).reshape((-1,) + (1,) * (points.ndim - 1))
-    return jnp.where(odd, parts @ weight, parts[..., 0])
+    """The near flow without A."""
+    copies = _copies(wake)
+    return _summed(_each(functions, modes, points, copies), modes, points, copies.weight)
 
 
 def _means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
@@ -142,5 +171,7 @@ def wake_flow(
     """Return the velocity of each mode's unit state at any hub-frame points, over R: near above, far deep below."""
     depth = jnp.maximum(-points[..., 2], 0.0)
     near = jnp.exp(-depth / (wake.length + 1e-12))  # a wake that does not contract has no length
-    both = near_flow(functions, modes, points, wake), far_flow(functions, modes, points, wake)
-    return near * both[0] + (1 - near) * both[1]
+    copies, amplitude = _copies(wake), 2 / sqrt(3) / _means(FIRST, wake)[0]
+    whole = Copies(*(jnp.append(v, w) for v, w in zip(copies, (wake.radius, 0.0, 1.0), strict=True)))
+    weight = jnp.append(near[..., None] * amplitude * copies.weight, 1 - near[..., None], axis=-1)
+    return _summed(_each(functions, modes, points, whole), modes, points, weight)

@@ -147,6 +147,15 @@ def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Arr
     return jnp.where(points[..., 2] >= 0, above, below)
 
 
+def column_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
+    """Return the part of `axial_functions` that the air of the wake's column has alone: 2P̄ of odd modes, below.
+
+    Without it the flow of a disk of sinks is left, the same above and below.
+    """
+    inside = 2 * disk_functions(modes, points[..., 0], points[..., 1]) * (points[..., 2] < 0)
+    return jnp.where(modes.odd.reshape((-1,) + (1,) * (points.ndim - 1)), inside, 0.0)
+
+
 def field_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
     """Return the velocity (hub frame) of each mode's unit state at any hub-frame points."""
     above = velocity_functions(modes, _mirrored(points))[:2]

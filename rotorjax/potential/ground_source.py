@@ -25,7 +25,7 @@ from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.potential.contraction import Contraction, far_flow
 from rotorjax.potential.ellipsoidal import ellipsoidal
-from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions
+from rotorjax.potential.field import axial_functions, disk_functions, pressure_functions, velocity_functions
 from rotorjax.potential.modes import ModeTable
 from rotorjax.region import Region
 
@@ -131,6 +131,11 @@ def sheet_flow(
 
     added = jax.lax.map(tilt, points.reshape(-1, 3), batch_size=256)
     return pressure_functions(modes, level) + jnp.moveaxis(added.reshape(*points.shape[:-1], len(modes)), -1, 0)
+
+
+def level_flow(modes: ModeTable, height: Float[Array, ""], points: Float[Array, "*N 3"]) -> Float[Array, "3 G ..."]:
+    """Return the velocity (hub frame) of unit states of odd modes on a level plane at points above it."""
+    return -velocity_functions(modes, points + height * np.array([0.0, 0.0, 1.0]))
 
 
 def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "G ..."]:

@@ -1,4 +1,5 @@
-"""The finite-state inflow model of a rotor in hover, in or out of ground effect: the functions that users call.
+"""The finite-state inflow model of a rotor in hover, in or out of ground effect, beside and above solid surfaces: the
+functions that users call.
 
     model = finite_state_model(plane(1.0, 15.0), harmonics=1, ground_harmonics=1)
     tau = loading.from_distribution(dct_dr, r, weights, psi, model.modes)
@@ -28,15 +29,19 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float
 
+from rotorjax.checks import known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.potential.contraction import Contraction, contraction, disk_flow, disk_means, wake_flow
-from rotorjax.potential.field import disk_functions, field_functions
+from rotorjax.panels.surface import Panels, Solid, check_clear, check_panels, floor, solid
+from rotorjax.potential import surfaces as beside
+from rotorjax.potential.contraction import Contraction, Functions, contraction, disk_flow, disk_means, wake_flow
+from rotorjax.potential.field import column_functions, disk_functions, field_functions
 from rotorjax.potential.ground_source import (
     Correction,
     DiskQuadrature,
     correction,
     ground_on_rotor,
+    level_flow,
     printed_strengths,
     rotor_on_ground,
     self_flow,
@@ -93,10 +98,10 @@ class FiniteStateModel(eqx.Module):
 
     modes: rotor table, M modes; sources: ground table, G modes (static). ground: `Plane` or None. correction: b and
     p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). wake: how it contracts
-    far from the ground, None for a cylinder. region: the part of the plane where there is ground, None for all of it.
-    ground_radius (): of the ground disk, over R, None for that of the wake there. strengths, ground_in_mass_flow,
-    slope, mass_flow: static, see the module's head; mass_flow "paper" gives V_T to a_1^0 and V̄ to all others, "linear"
-    V_T to all, "harmonics" V_T to the axisymmetric ones.
+    far from the ground, None for a cylinder. surfaces: beside and under the rotor, or None. region: the part of the
+    plane where there is ground, None for all of it. ground_radius (): of the ground disk, over R, None for that of the
+    wake there. strengths, ground_in_mass_flow, slope, mass_flow: static, see the module's head; mass_flow "paper" gives
+    V_T to a_1^0 and V̄ to all others, "linear" V_T to all, "harmonics" V_T to the axisymmetric ones.
     """
 
     modes: ModeTable
@@ -108,6 +113,7 @@ class FiniteStateModel(eqx.Module):
     region: Region | None = None
     ground_radius: Float[Array, ""] | None = None
     wake: Contraction | None = None
+    surfaces: Solid | None = None
     strengths: Strengths = eqx.field(static=True, default="closed")
     ground_in_mass_flow: bool = eqx.field(static=True, default=False)
     slope: Slope = eqx.field(static=True, default="sheared")
@@ -135,10 +141,12 @@ class FiniteStateModel(eqx.Module):
 
 
 class FiniteState(eqx.Module):
-    """Velocity states. a (M,): rotor; c (G,): ground sources, zero without ground; both over ΩR."""
+    """Velocity states over ΩR. a (M,): rotor. c (S,): sources, the ground's G, which are zero without it, and behind
+    them the densities of the surfaces' panels.
+    """
 
     a: Float[Array, " M"]
-    c: Float[Array, " G"]
+    c: Float[Array, " S"]
 
 
 def finite_state_model(
@@ -148,13 +156,16 @@ def finite_state_model(
     ground_harmonics: int = 0,
     ground_radial_terms: int = 7,
     printed: bool = False,
+    surfaces: Panels | None = None,
     **settings: Unpack[Settings],
 ) -> FiniteStateModel:
     """Make the model: by default the choices that agree best with measurements and the free wake, or the paper's own.
 
     harmonics, ground_harmonics: the highest harmonic (a slope needs at least 1); radial_terms, ground_radial_terms:
-    terms of each harmonic (τ₁, τ₃, τ₅). printed: the paper's choices (`PRINTED`). settings: single ones instead of
-    these (`Settings`): b, p: of the factor b^{η^p} on the r = j terms, which only even sources have (π/7 and 2);
+    terms of each harmonic (τ₁, τ₃, τ₅). printed: the paper's choices (`PRINTED`). surfaces: that no air goes through,
+    in the hub frame (`panels.shapes`; how: `potential.surfaces`); ground beside them must be level. settings: single
+    ones instead of these (`Settings`): b, p: of the factor b^{η^p} on the r = j terms, which only even sources have
+    (π/7 and 2);
     even_terms: see `modes.rotor_modes`, for dynamics; region: the part of the plane where there is ground
     (`rotorjax.region`, best with ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk.
     Raises InputError where a count or a setting is not allowed.
@@ -171,6 +182,8 @@ def finite_state_model(
     }
     _check(chosen, harmonics, ground_harmonics)
     _check_height(ground, chosen)
+    if surfaces is not None:
+        _check_surfaces(surfaces, ground, chosen)
     radius = chosen.get("ground_radius")
     return FiniteStateModel(
         rotor_modes(harmonics, radial_terms, chosen.get("even_terms", 0)),
@@ -181,6 +194,7 @@ def finite_state_model(
         chosen["mass_flow"],
         chosen.get("region"),
         None if radius is None else jnp.asarray(radius, float),
+        surfaces=None if surfaces is None else solid(surfaces, ground),
         **{name: chosen[name] for name in ("wake", "strengths", "ground_in_mass_flow", "slope")},
     )
 
@@ -217,6 +231,33 @@ def _check_height(ground: Plane | None, chosen: dict[str, Any]) -> None:
         )
 
 
+def _check_surfaces(surfaces: Panels, ground: Plane | None, chosen: dict[str, Any]) -> None:
+    """Raise InputError where surfaces cut the disk, or a setting or a slope does not go with them."""
+    check_panels(surfaces)
+    check_clear(surfaces)
+    if chosen.get("even_terms", 0):
+        raise InputError(
+            f"Argument `even_terms` must be 0 beside surfaces, which answer steady flow, but is {chosen['even_terms']}"
+        )
+    if ground is None:
+        return
+    if known(ground.slope) and float(ground.slope) != 0:
+        raise InputError(
+            f"Argument `ground` must be level beside surfaces, but its slope is {np.rad2deg(float(ground.slope)):g} "
+            "deg: make the slope of panels (rj.terrain), or take the free wake (rj.free_wake)"
+        )
+    if chosen["ground_parity"] == "even":
+        raise InputError(
+            "Argument `ground_parity` must be 'odd' beside surfaces, since even sources leave the plane open, but is "
+            "'even': leave it out, and `printed`, or make the ground of panels"
+        )
+    if chosen.get("region") is not None:
+        raise InputError(
+            "Argument `region` must be left out beside surfaces, whose images need the whole plane: make the deck of "
+            "panels (rj.slab)"
+        )
+
+
 def choices(model: FiniteStateModel) -> dict[str, Any]:
     """Return the model's choices by name, as plain values; the wake by its three numbers, absent where a cylinder."""
     named = {name: getattr(model, name) for name in ("strengths", "ground_in_mass_flow", "slope", "mass_flow")}
@@ -225,7 +266,11 @@ def choices(model: FiniteStateModel) -> dict[str, Any]:
 
 
 def wake_over(model: FiniteStateModel, ground: Plane | None) -> Contraction | None:
-    """Return how the wake contracts over a plane, or far from any; None for a cylinder."""
+    """Return how the wake contracts over a plane and surfaces (`panels.surface.floor`), or far from any; None for a
+    cylinder.
+    """
+    if model.surfaces is not None:
+        ground = floor(model.surfaces.panels, ground)
     return model.wake if model.wake is None or ground is None else model.wake.over(ground.height)
 
 
@@ -251,7 +296,13 @@ def closing(model: FiniteStateModel, ground: Plane) -> Float[Array, "G N"]:
 
 def rotor_into_ground(model: FiniteStateModel, ground: Plane) -> Float[Array, "M N"]:
     """Return the flow of unit rotor states into a plane at the ground disk's points, along its normal."""
-    return rotor_on_ground(model.modes, ground, *footprint(model, ground), wake_over(model, ground))
+    (x, y), wake = footprint(model, ground), wake_over(model, ground)
+    into = rotor_on_ground(model.modes, ground, x, y, wake)
+    if model.surfaces is None:
+        return into
+    points = jnp.stack([x, y, jnp.broadcast_to(-ground.height, x.shape)], axis=-1)
+    column = column_functions(model.modes, points if wake is None else points / wake.radius)  # as in `far_flow`
+    return into - beside.shadow(model.surfaces.panels, points) * column
 
 
 def ground_matrix(model: FiniteStateModel, ground: Plane) -> Float[Array, "G M"]:
@@ -277,8 +328,60 @@ def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "
     return ground_on_rotor(model.sources, ground, model.correction, points)
 
 
-def mean_upflow(model: FiniteStateModel, ground: Plane) -> Float[Array, " G"]:
-    """Return the area-weighted mean over the disk of the upward velocity of unit ground states."""
+def level_velocity(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "3 G ..."]:
+    """Return the velocity (hub frame) of unit states of odd sources at points above level ground."""
+    size = source_radius(model, ground)
+    return level_flow(model.sources, ground.height / size, points / size)
+
+
+def answer_matrix(model: FiniteStateModel) -> Float[Array, "S M"]:
+    """Return G of c = G a: the sources with which ground and surfaces answer unit rotor states."""
+    none = jnp.zeros((len(model.sources), len(model.modes)))
+    of_ground = none if model.ground is None else ground_matrix(model, model.ground)
+    if model.surfaces is None:
+        return of_ground
+    panels = model.surfaces.panels
+    through = jnp.einsum("amp,pa->mp", _open_flow(model, of_ground, panels.middles), panels.normals)
+    return jnp.concatenate([of_ground, beside.answers(model.surfaces, through, model.ground)])
+
+
+def _open_flow(
+    model: FiniteStateModel, of_ground: Float[Array, "G M"], points: Float[Array, "*N 3"]
+) -> Float[Array, "3 M ..."]:
+    """Velocity of unit rotor states with the answer of a level ground, but without the surfaces'."""
+    rotor = rotor_velocity(model, model.ground, points)
+    if model.ground is None:
+        return rotor
+    return rotor + jnp.einsum("gm,ag...->am...", of_ground, level_velocity(model, model.ground, points))
+
+
+def answer_upflow(
+    model: FiniteStateModel, sources: Float[Array, "S M"], points: Float[Array, "*N 3"]
+) -> Float[Array, "M ..."]:
+    """Return the upward velocity of M sets of source states at hub-frame points, of ground and surfaces."""
+    count = len(model.sources)
+    up = jnp.zeros((sources.shape[1], *points.shape[:-1]), points.dtype)
+    if model.ground is not None:
+        up = jnp.tensordot(sources[:count].T, ground_upflow(model, model.ground, points), 1)
+    if model.surfaces is not None:
+        up = up + beside.flow(model.surfaces, sources[count:], points, model.ground)[2]
+    return up
+
+
+def mean_upflow(model: FiniteStateModel, sources: Float[Array, "S M"]) -> Float[Array, " M"]:
+    """Return the area-weighted mean over the disk of the upward velocity of M sets of source states."""
+    x, y, nu, weights = MEAN.rule()  # r dr = −ν dν
+    count, up = len(model.sources), jnp.zeros(sources.shape[1])
+    if model.ground is not None:
+        up = _ground_means(model, model.ground) @ sources[:count]
+    if model.surfaces is not None:
+        points = jnp.asarray(np.stack([x, y, 0 * x], axis=-1))
+        up = up + beside.flow(model.surfaces, sources[count:], points, model.ground)[2] @ (2 * nu * weights)
+    return up
+
+
+def _ground_means(model: FiniteStateModel, ground: Plane) -> Float[Array, " G"]:
+    """Area-weighted mean over the disk of the upward velocity of unit ground states."""
     x, y, nu, weights = MEAN.rule()
     half = y > 0  # the plane rises along x: cosines are even in y, and sines have no mean
     points = jnp.asarray(np.stack([x, y, 0 * x], axis=-1)[half])  # r dr = −ν dν
@@ -296,19 +399,18 @@ def rotor_means(model: FiniteStateModel, ground: Plane | None) -> Float[Array, "
 
 def answer_means(model: FiniteStateModel) -> Float[Array, " M"]:
     """Return the mean upflow of the ground's answer to unit rotor states, zero where the mass flow leaves it out."""
-    if model.ground is None or not model.ground_in_mass_flow:
-        return jnp.zeros(len(model.modes))
-    return unit_states(model).up
+    alone = model.ground is None and model.surfaces is None
+    return jnp.zeros(len(model.modes)) if alone or not model.ground_in_mass_flow else unit_states(model).up
 
 
 class UnitStates(eqx.Module):
     """What unit rotor states make, whatever the loading: the costly part of a model, linear, so once is enough.
 
-    sources (G, M): the ground's answer, G of c = G a. down, up (M,): area-weighted mean over the disk of their own
-    inflow and of the answer's upflow; sources and up are zero without ground.
+    sources (S, M): the answer of ground and surfaces, G of c = G a. down, up (M,): area-weighted mean over the disk of
+    their own inflow and of the answer's upflow; sources and up are zero without either.
     """
 
-    sources: Float[Array, "G M"]
+    sources: Float[Array, "S M"]
     down: Float[Array, " M"]
     up: Float[Array, " M"]
 
@@ -316,11 +418,8 @@ class UnitStates(eqx.Module):
 @eqx.filter_jit
 def unit_states(model: FiniteStateModel) -> UnitStates:
     """Return what unit rotor states make."""
-    down = rotor_means(model, model.ground)
-    if model.ground is None:
-        return UnitStates(jnp.zeros((len(model.sources), len(model.modes)), down.dtype), down, jnp.zeros_like(down))
-    sources = ground_matrix(model, model.ground)
-    return UnitStates(sources, down, mean_upflow(model, model.ground) @ sources)
+    sources = answer_matrix(model)
+    return UnitStates(sources, rotor_means(model, model.ground), mean_upflow(model, sources))
 
 
 @eqx.filter_jit
@@ -370,10 +469,8 @@ def steady_state(
 
 @eqx.filter_jit
 def with_ground(a: Float[Array, " M"], model: FiniteStateModel) -> FiniteState:
-    """Return the state with rotor states a and the ground's sources c = G a (Eq. 36)."""
-    if model.ground is None:
-        return FiniteState(a, jnp.zeros(len(model.sources), a.dtype))
-    return FiniteState(a, ground_matrix(model, model.ground) @ a)
+    """Return the state with rotor states a and the sources c = G a of ground (Eq. 36) and surfaces."""
+    return FiniteState(a, answer_matrix(model) @ a)
 
 
 def rotor_flow(
@@ -388,49 +485,58 @@ def rotor_flow(
 def rotor_velocity(
     model: FiniteStateModel, ground: Plane | None, points: Float[Array, "*N 3"]
 ) -> Float[Array, "3 M ..."]:
-    """Return the velocity (hub frame) of unit rotor states at any points, the wake as it is over a plane."""
+    """Return the velocity (hub frame) of unit rotor states at any points, the wake as it is over a plane; in the shadow
+    of surfaces without its column.
+    """
+    flow = _in_wake(model, ground, field_functions, points)
+    if model.surfaces is None:
+        return flow
+    column = _in_wake(model, ground, column_functions, points)
+    return flow.at[2].add(beside.shadow(model.surfaces.panels, points) * column)
+
+
+def _in_wake(model: FiniteStateModel, ground: Plane | None, functions: Functions, points: Array) -> Array:
+    """Functions of unit states in a cylinder, laid along the wake as it is over a plane."""
     wake = wake_over(model, ground)
-    if wake is None:
-        return field_functions(model.modes, points)
-    return wake_flow(field_functions, model.modes, points, wake)
+    return functions(model.modes, points) if wake is None else wake_flow(functions, model.modes, points, wake)
 
 
 @eqx.filter_jit
 def unit_inflow(
     model: FiniteStateModel, unit: UnitStates, x: Float[Array, "*N"], y: Float[Array, "*N"]
 ) -> Float[Array, "M ..."]:
-    """Return the inflow of unit rotor states at stations (x, y) of the disk, over R, with the ground's answer."""
-    down = rotor_flow(model, model.ground, x, y)
-    if model.ground is None:
-        return down
+    """Return the inflow of unit rotor states at stations (x, y) of the disk, over R, with the answer to it."""
     points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
-    return down - jnp.tensordot(unit.sources.T, ground_upflow(model, model.ground, points), 1)
+    return rotor_flow(model, model.ground, x, y) - answer_upflow(model, unit.sources, points)
 
 
 @eqx.filter_jit
 def disk_inflow(
     state: FiniteState, x: Float[Array, "*N"], y: Float[Array, "*N"], model: FiniteStateModel
 ) -> Float[Array, "*N"]:
-    """Return λ over ΩR, positive down, at hub-frame stations (x, y) of the disk, over R, with the ground's effect."""
-    down = jnp.tensordot(state.a, rotor_flow(model, model.ground, x, y), 1)
-    if model.ground is None:
-        return down
+    """Return λ over ΩR, positive down, at hub-frame stations (x, y) of the disk, over R, with the effect of ground and
+    surfaces.
+    """
     points = jnp.stack([x, y, jnp.zeros_like(x)], axis=-1)
-    return down - jnp.tensordot(state.c, ground_upflow(model, model.ground, points), 1)
+    down = jnp.tensordot(state.a, rotor_flow(model, model.ground, x, y), 1)
+    return down - answer_upflow(model, state.c[:, None], points)[0]
 
 
 @eqx.filter_jit
 def velocity(state: FiniteState, points: Float[Array, "*N 3"], model: FiniteStateModel) -> Float[Array, "*N 3"]:
     """Return the induced velocity at hub-frame points over R, in the hub frame over ΩR.
 
-    On, above and below the disk, inside and outside the wake. The ground's part is its axial component
-    only, as in the paper, and holds above the plane.
+    On, above and below the disk, inside and outside the wake. The ground's part is its axial component only, as in the
+    paper, and holds above the plane; beside surfaces, which the ground's flow has to go round, it is all three.
     """
     rotor = jnp.tensordot(state.a, rotor_velocity(model, model.ground, points), [[0], [1]])
+    if model.surfaces is None:
+        return jnp.moveaxis(rotor.at[2].add(answer_upflow(model, state.c[:, None], points)[0]), 0, -1)
+    of_ground, of_panels = state.c[: len(model.sources)], state.c[len(model.sources) :]
+    flow = rotor + beside.flow(model.surfaces, of_panels[:, None], points, model.ground)[:, 0]
     if model.ground is not None:
-        up = jnp.tensordot(state.c, ground_upflow(model, model.ground, points), 1)
-        rotor = rotor.at[2].add(up)
-    return jnp.moveaxis(rotor, 0, -1)
+        flow = flow + jnp.tensordot(of_ground, level_velocity(model, model.ground, points), [[0], [1]])
+    return jnp.moveaxis(flow, 0, -1)
 
 
 @eqx.filter_jit
@@ -444,8 +550,7 @@ def inflow(
 @eqx.filter_jit
 def mean_inflow(state: FiniteState, model: FiniteStateModel) -> Float[Array, ""]:
     """Return the area-weighted mean of λ over the whole disk, over ΩR."""
-    down = rotor_means(model, model.ground) @ state.a
-    return down if model.ground is None else down - mean_upflow(model, model.ground) @ state.c
+    return rotor_means(model, model.ground) @ state.a - mean_upflow(model, state.c[:, None])[0]
 
 
 @eqx.filter_jit
@@ -458,7 +563,7 @@ def ground_normal_velocity_rms(state: FiniteState, model: FiniteStateModel) -> F
     if model.ground is None:
         raise InputError("Argument `model` must have a ground, but its ground is None")
     into = state.a @ rotor_into_ground(model, model.ground)
-    return relative_residual(state.c, into, model, model.ground)
+    return relative_residual(state.c[: len(model.sources)], into, model, model.ground)
 
 
 def relative_residual(

@@ -168,6 +168,10 @@ def ground_states(
     "printed" strengths answer the rotor's flow as printed, the plane's own motion in full.
     """
     require_variant(variant, transport)
+    if model.surfaces is not None:
+        raise InputError(
+            "Argument `model` must have no surfaces beside ground that moves, but has some: leave them out"
+        )
     row, column = strength_factors(model)
     carried = None if wake is None else wake * column
     flow = _rotor_flow(a * column, motion, model, variant, transport, carried)

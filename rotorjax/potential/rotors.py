@@ -51,6 +51,10 @@ def rotors(
     model: its own plane is not used. ground: under the common origin; every rotor must be level then. Raises
     InputError where shapes differ, a sense is not ±1, disks meet, or a disk would cut the ground.
     """
+    if model.surfaces is not None:
+        raise InputError(
+            "Argument `model` must have no surfaces among several rotors, but has some: take rj.several_wakes"
+        )
     place = np.array(positions, float)
     count = len(place)
     tilts = np.zeros((count, 2)) if tilts_deg is None else np.array(tilts_deg, float)

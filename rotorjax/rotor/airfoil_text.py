@@ -1,5 +1,6 @@
 """What the readers of airfoil files share: lines, numbers, and the coefficient over angle and Mach number."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from rotorjax.errors import InputError
 
 Coefficient = tuple[np.ndarray, np.ndarray, np.ndarray]
 """(angles in degrees [N], Mach numbers [C], values [N, C])."""
+_FORTRAN = re.compile(r"(?<=[\d.])[dD](?=[+-]?\d)")  # 1.0D-01
 _MOST = 1e12  # nothing in these files is larger, and squares and slopes of it stay finite
 
 
@@ -23,7 +25,7 @@ def require_lines(path: str | Path, text: str) -> list[str]:
 def number(text: str, where: str) -> float:
     """A number. Raises InputError, naming `where`, where it is none, not finite, or beyond all sense."""
     try:
-        found = float(text) if "_" not in text else np.nan
+        found = float(_FORTRAN.sub("e", text)) if "_" not in text else np.nan
     except ValueError:
         found = np.nan
     if not abs(found) <= _MOST:

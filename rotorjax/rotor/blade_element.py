@@ -15,6 +15,7 @@ because on the UH-60 it concerns the last 7 % of the span, where a tip is anythi
 paper nor the tables' source applies it.
 """
 
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -89,15 +90,8 @@ def section_loads(
     speed = jnp.where(still, 0.0, jnp.sqrt(safe_t**2 + u_p**2))
     alpha = pitch - jnp.arctan2(u_p + chord_downwash, safe_t)
     mach = speed * operating.tip_mach(rotor.radius)
-    entry = alpha if span_mean is None else mean_angle(alpha, span_mean)
-    if span_mean is None:
-        cl, cd = _coefficients(rotor, r, entry, mach, simple_sweep)
-    else:
-        # one look-up for the sections' own angles and, at zero angle, for the slope where the flow is attached
-        angles = entry * np.array([0.0, 1.0], entry.dtype).reshape(2, *(1,) * entry.ndim)
-        look_up = partial(_coefficients, rotor, r, mach=mach, simple_sweep=simple_sweep)
-        (cl, cd), (slope, _) = jax.jvp(look_up, (angles,), (jnp.ones_like(angles),))
-        cl, cd = cl[1] + slope[0] * _limited(alpha - entry), cd[1]
+    look_up = partial(_coefficients, rotor, r, mach=mach, simple_sweep=simple_sweep)
+    cl, cd = look_up(alpha) if span_mean is None else _averaged(look_up, alpha, span_mean)
     half_chord = 0.5 * geometry.chord(rotor, r)
     dynamic = half_chord * (u_t**2 + u_p**2)
     return SectionLoads(
@@ -110,6 +104,17 @@ def section_loads(
         inflow_angle=phi,
         mach=mach,
     )
+
+
+def _averaged(
+    look_up: Callable[[Array], tuple[Array, Array]], alpha: Float[Array, "*n R"], span_mean: Float[Array, "R R"]
+) -> tuple[Array, Array]:
+    """Lift and drag whose stall follows the angle averaged along the span."""
+    entry = mean_angle(alpha, span_mean)
+    # one look-up for the sections' own angles and, at zero angle, for the slope where the flow is attached
+    angles = entry * np.array([0.0, 1.0], entry.dtype).reshape(2, *(1,) * entry.ndim)
+    (cl, cd), (slope, _) = jax.jvp(look_up, (angles,), (jnp.ones_like(angles),))
+    return cl[1] + slope[0] * _limited(alpha - entry), cd[1]
 
 
 def attached_slope(rotor: Rotor, operating: OperatingPoint, speed: Float[Array, "*n"]) -> Float[Array, "*n"]:

@@ -46,7 +46,7 @@ def read_c81(path: str | Path) -> C81:
     if not found:
         raise InputError(f"{path}, line 1: six two-digit counts must follow column 30, but it reads {lines[0][:60]!r}")
     start, counts = found[0]
-    if min(counts) < 1:
+    if min(counts[:4]) < 1 or (counts[4] == 0) != (counts[5] == 0):  # moments may be left out
         raise InputError(f"{path}, line {start + 1}: the six counts must be positive, but are {counts}")
     reader = _Reader(path, lines, start + 1)
     tables = [reader.coefficient(n_mach, n_alpha) for n_mach, n_alpha in zip(counts[::2], counts[1::2], strict=True)]
@@ -60,6 +60,8 @@ class _Reader:
         self.path, self.lines, self.at = path, lines, at
 
     def coefficient(self, n_mach: int, n_alpha: int) -> Coefficient:
+        if n_mach == 0:
+            return np.zeros(0), np.zeros(0), np.zeros((0, 0))
         first = self.at + 1
         mach = self._row(n_mach, labelled=False)
         require_increasing(self.path, "Mach numbers", mach, [first] * n_mach)

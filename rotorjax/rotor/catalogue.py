@@ -40,8 +40,7 @@ def load(name_or_path: str | Path, changes: Changes | None = None) -> tuple[Roto
     if name_or_path not in names():
         hint = closest(str(name_or_path), names())
         raise InputError(
-            f"Argument `name_or_path` must be a rotor of the catalogue or a .toml file, but is "
-            f"{shown(name_or_path)}: {hint}"
+            f"Argument `rotor` must be a rotor of the catalogue or a .toml file, but is {shown(name_or_path)}: {hint}"
         )
     return _read(_folder() / f"{name_or_path}.toml", changes)
 

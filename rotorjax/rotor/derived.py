@@ -10,7 +10,7 @@ from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor, solidity
 
-MOST_SOLIDITY, MOST_TIP_MACH = 0.5, 1.2
+MOST_SOLIDITY, MOST_TIP_MACH, MOST_SLOPE = 0.5, 1.2, 30.0
 _TABLE_END = 0.05  # by which the tip's Mach number may exceed the section's last one
 _AT = 0.75  # r/R of the Reynolds number and the lift slope
 
@@ -67,6 +67,31 @@ def describe(rotor: Rotor, operating: OperatingPoint) -> str:
     return ", ".join(parts) + f"; section {rotor.airfoil.name or 'unnamed'}"
 
 
+def doubts(rotor: Rotor, operating: OperatingPoint) -> list[str]:
+    """Numbers that may be meant and are more often a wrong unit: each with its value, the usual ones and its keys."""
+    found = derived(rotor, operating)
+    slope = lift_slope(rotor, _AT * found.tip_mach)
+    usual = [
+        ("density", float(operating.density), 0.2, 2.0, " kg/m3", ""),
+        ("sound_speed", float(operating.sound_speed), 200.0, 400.0, " m/s", ""),
+        ("viscosity", float(operating.viscosity), 5e-6, 1e-4, " m2/s, kinematic", ""),
+        ("the tip Mach number", found.tip_mach, 0.08, MOST_TIP_MACH, "", ": check rpm, radius and sound_speed"),
+        ("the lift slope", slope, 2.0, MOST_SLOPE, " per rad", ": check that the airfoil's angles are in degrees"),
+        ("the solidity", found.solidity, 0.01, MOST_SOLIDITY, "", ": check chord and radius"),
+    ]
+    if rotor.hinge is not None and found.lock is not None:
+        centre = float(rotor.hinge.first_moment / rotor.hinge.blade_mass / rotor.radius)
+        usual += [
+            ("the Lock number", found.lock, 0.5, 30.0, "", ": check flap_inertia, density and chord"),
+            ("first_moment/blade_mass/radius", centre, 0.05, 0.8, "", ": a blade's centre of mass behind the hinge"),
+        ]
+    return [
+        f"{rotor.name}: {name} is {value:.4g}{unit}, where rotors in air have {low:g} to {high:g}{keys}"
+        for name, value, low, high, unit, keys in usual
+        if not low <= value <= high
+    ]
+
+
 def notes(rotor: Rotor) -> list[str]:
     """What a user should know about a rotor before trusting how its blades move."""
     hinge = rotor.hinge
@@ -91,6 +116,11 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
         raise InputError(
             f"The tip Mach number must be at most {MOST_TIP_MACH:g}, but is {found.tip_mach:.3g}: check rpm ({rpm:g}) "
             f"and radius ({radius:g} m)"
+        )
+    if (slope := lift_slope(rotor, _AT * found.tip_mach)) > MOST_SLOPE:
+        raise InputError(
+            f"The lift slope at {_AT:g} R must be at most {MOST_SLOPE:g} per rad, but is {slope:.3g}: check that the "
+            "airfoil's angles are in degrees"
         )
     last = float(np.asarray(rotor.airfoil.mach)[-1])
     if found.tip_mach > last + _TABLE_END:

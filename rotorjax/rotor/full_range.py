@@ -29,6 +29,11 @@ def completed(
     for name, (alpha, _, _) in both.items():
         if alpha[0] < -180 or alpha[-1] > 180:
             raise InputError(f"The {name} table must lie within -180 to 180 deg, but runs {_span(alpha)}")
+        if outer == FLAT_PLATE and not alpha[0] < 0 < alpha[-1]:  # the plate would be half of what lifts
+            raise InputError(
+                f"[airfoil] the {name} table must hold angles on both sides of 0 for full_range = {FLAT_PLATE!r}, but "
+                f"runs {_span(alpha)}" + (": give symmetric = true, if the section is" if alpha[0] == 0 else "")
+            )
     if outer is not None:
         if all(_reaches(c) for c in both.values()):
             key = "full_range" if isinstance(outer, str) else "full_range_file"

@@ -153,9 +153,10 @@ def rotor(
         raise refuse("rotation", f"be one of {', '.join(ROTATIONS)}", shown(rotation))
     check_range("radius", radius, RADIUS)
     check_number("root_cutout", root_cutout, 0.0, 0.95)
-    check_number("tip_loss", tip_loss, float(root_cutout) if known(root_cutout) else 0.0, 1.0, open_=True)
+    inner = float(root_cutout) if known(root_cutout) else 0.0
+    check_range("tip_loss", tip_loss, Range(inner, 1.0, "R, beyond root_cutout", above=True))
     if hinge is not None and known(hinge.offset, radius):
-        check_number("hinge.offset", hinge.offset, 0.0, 0.5 * float(radius))
+        check_range("hinge.offset", hinge.offset, Range(0.0, 0.5 * float(radius), "m, up to half the radius"))
     tables = {
         "chord": _table("chord", chord, root_cutout, CHORD),
         "twist": _table("twist", twist, root_cutout, Range(-np.pi / 2, np.pi / 2, "rad", hint=_RADIANS)),
@@ -200,7 +201,10 @@ def hinge(
     for name, value in positive.items():
         check_range(f"hinge.{name}", value, Range(0.0, 1e10, above=True))
     if known(blade_mass, first_moment):
-        check_number("hinge.flap_inertia", flap_inertia, first_moment**2 / blade_mass)
+        least = first_moment**2 / blade_mass
+        if known(flap_inertia) and flap_inertia < least:
+            rule = f"be at least first_moment²/blade_mass, {least:.4g} kg m2"
+            raise refuse("hinge.flap_inertia", rule, f"{float(flap_inertia):g}")
     for name, value in {"delta3": delta3, "precone": precone}.items():
         check_range(f"hinge.{name}", value, Range(-1.5, 1.5, "rad", hint=_RADIANS))
     rate, force = (None, None) if damper is None else _damper(damper, damper_arm)

@@ -256,18 +256,15 @@ def march(
 
     Raises InputError where the steps are too few for the wake, with the number that is enough.
     """
-    start = trimmed if isinstance(trimmed, Start) else from_result(trimmed)
     if batch is not None:
         check_whole("batch", batch, 1, 100_000)
     if old_age not in get_args(OldAge):
         raise InputError(f"Argument `old_age` must be one of {get_args(OldAge)}, but is {shown(old_age)}")
     context = precision_of(precision)
-    if surfaces is not None:
-        start = _past(start, surfaces)
+    start = trimmed if isinstance(trimmed, Start) else from_result(trimmed)
+    start = start if surfaces is None else _past(start, surfaces)
     start = replace(start, p=marching(start.p, bound_filter=bound_filter))
-    steps = usual_steps(start) if steps_per_turn is None else check_whole("steps_per_turn", steps_per_turn, 1, 100_000)
-    if steps_per_turn is not None and steps < (least := least_steps(start)):
-        raise InputError(f"Argument `steps_per_turn` must be at least {least} for this wake, but is {steps}")
+    steps = _steps(start, steps_per_turn)
     angle = 2 * np.pi / steps
     with context:
         x, u, p = on_device(cast((start.x, start.inputs, start.p), precision))
@@ -284,6 +281,16 @@ def march(
     seconds = angle / float(start.p.operating.omega)
     needed = stable_steps(start)
     return March(first, u, steps, seconds, precision, steps / needed if needed else np.inf, program)
+
+
+def _steps(start: Start, wanted: int | None) -> int:
+    """Steps of a revolution, the usual ones where none are wanted. Raises InputError where those are too few."""
+    if wanted is None:
+        return usual_steps(start)
+    steps = check_whole("steps_per_turn", wanted, 1, 100_000)
+    if steps < (least := least_steps(start)):
+        raise InputError(f"Argument `steps_per_turn` must be at least {least} for this wake, but is {steps}")
+    return steps
 
 
 def _past(start: Start, surfaces: Panels) -> Start:

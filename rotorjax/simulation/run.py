@@ -21,7 +21,7 @@ from rotorjax.ode.trajectory import Trajectory, march
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import ATTITUDE, RotorInputs
-from rotorjax.simulation.case import MOST_A_TURN, OldAge, Precision, SimulationCase, steps_of
+from rotorjax.simulation.case import COLUMNS, MOST_A_TURN, OldAge, Precision, SimulationCase, steps_of
 from rotorjax.simulation.history import Piecewise, piecewise
 from rotorjax.simulation.march import MarchState, begun, cast, compiled, on_device, precision_of, stretch
 from rotorjax.simulation.pace import Pace
@@ -156,10 +156,15 @@ def fly_from(
 
 
 def check_histories(case: SimulationCase, omega: float, per_turn: int) -> None:
-    """Warn where points of a history stand closer than the steps, and say what they are taken for and what would do.
+    """Warn where a history does not begin with the trim's values, which it adds to, and where its points stand closer
+    than the steps: what they are taken for, and what would do.
 
     omega: rotor speed (rad/s). per_turn: steps of a revolution.
     """
+    for name, value in zip(COLUMNS, case.columns[0], strict=True):
+        if value != (100.0 if name == "rotor_speed" else 0.0):
+            rest = "100, the trim's" if name == "rotor_speed" else "0: it is added to the trim"
+            warnings.warn(f"[history] {name} begins at {value:g}, a jump at the start, not {rest}", stacklevel=3)
     turn = 2 * np.pi / omega
     step = turn / per_turn
     moving = np.any(np.diff(case.columns, axis=0) != 0, axis=1)

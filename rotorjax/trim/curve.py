@@ -14,8 +14,8 @@ def requests(base: Request, speeds: Sequence[float], heights: Sequence[float | N
     """Requests of a curve. Raises InputError where both vary, or one of them is not allowed."""
     if len(speeds) > 1 and len(heights) > 1:
         raise InputError(
-            f"Arguments `advance_ratio` and `height` must not both have several values, but have {len(speeds)} and "
-            f"{len(heights)}"
+            f"Either the speed or the height may have several values, but there are {len(speeds)} speeds and "
+            f"{len(heights)} heights"
         )
     found = [replace(base, advance=mu, height=h) for mu in speeds for h in heights]
     for request in found:

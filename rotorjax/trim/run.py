@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.checks import check_number, check_range, closest, shown
+from rotorjax.checks import check_number, check_range, refuse_choice
 from rotorjax.coupled import CoupledRotor, coupled_rotor
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
@@ -97,10 +97,7 @@ def request(rotor: str | Path, thrust: float, *arguments: Any, **more: Any) -> R
 def check(request: Request) -> None:
     """Raise InputError where something of a request is not allowed, before any work."""
     if not isinstance(request.inflow, str) or request.inflow not in INFLOWS:
-        raise InputError(
-            f"Argument `inflow` must be one of {', '.join(INFLOWS)}, but is {shown(request.inflow)}: "
-            f"{closest(str(request.inflow), INFLOWS)}"
-        )
+        raise refuse_choice("inflow", request.inflow, INFLOWS)
     if request.slope_deg and request.height is None:
         raise InputError(
             f"Argument `height` must be given with a slope, but only `slope` is: {request.slope_deg:g} deg"
@@ -115,6 +112,11 @@ def check(request: Request) -> None:
     check_place(request.inflow, request.height, request.slope_deg)
     if request.drag_area is not None:
         check_number("drag_area", request.drag_area, 0.0)
+        if request.tilt_deg:
+            raise InputError(
+                f"Argument `tilt_deg` must be left out with a drag_area, which the tilt balances, but is "
+                f"{request.tilt_deg:g}"
+            )
     if request.height is not None and request.climb:
         raise InputError(
             f"Argument `climb` must be 0 over ground (a steady state needs a fixed height), but is {request.climb:g}"

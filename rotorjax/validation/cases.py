@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from rotorjax.checks import closest
+from rotorjax.checks import check_number, closest
 from rotorjax.errors import InputError
 from rotorjax.validation import (
     caradonna_tung,
@@ -32,6 +32,8 @@ def chosen_cases(names: Sequence[str] | None, subject: Subject) -> tuple[Validat
     """
     if subject.rotor is None and subject.collective_deg is not None:
         raise InputError("Argument `collective` must come with a rotor, but `rotor` is not given")
+    if subject.collective_deg is not None:
+        check_number("collective", subject.collective_deg, -45.0, 45.0)
     for name in names or ():
         if name not in CASES:
             raise InputError(f"Argument `case` must name a case, but is '{name}': {closest(name, CASES)}")

@@ -70,25 +70,35 @@ def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, "
     """
     turn = model.settings.old_segments_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
-    drift = along = jnp.zeros(3, nodes.dtype)
-    if model.flight is not None:
-        along = model.flight.wind * np.array([1.0, 1.0, 0.0])
-        drift = 2 * jnp.pi * rotate_about_shaft(along, -psi)
+    along = None if model.flight is None else model.flight.wind * np.array([1.0, 1.0, 0.0])
     # all repeats at once, (F, repeats, N, 3)
     after = jnp.asarray(repeats(model).after)[:, None]
     if model.floor is None:
         pitch = jnp.mean(last[..., 2] - before[..., 2], axis=1)
-        down = pitch[:, None] * np.array([0.0, 0.0, 1.0]) + drift
+        down = pitch[:, None] * np.array([0.0, 0.0, 1.0]) + (0.0 if along is None else _drift(along, psi))
         return _in_line(model, last[:, None] + after[..., None] * down[:, None, None])
-    plane = model.floor
+    return _in_line(model, _over_plane(model.floor, last, before, after, along, psi))
+
+
+def _over_plane(
+    plane: Plane,
+    last: Float[Array, "F N 3"],
+    before: Float[Array, "F N 3"],
+    after: Float[Array, "K 1"],
+    along: Float[Array, " 3"] | None,
+    psi: Float[Array, ""],
+) -> Float[Array, "F K N 3"]:
+    """The last free turn, repeated as it comes down to a plane; along: wind in the disk, None for hover."""
     # heights do not depend on the frame, so only the foot and the normal have to be turned into the blade's
     normal = rotate_about_shaft(plane.normal, -psi)
     # where the shaft meets the plane, which a hub that has turned sees elsewhere than under its height
     foot = -plane.height * jnp.cos(plane.slope) / normal[2] * np.array([0.0, 0.0, 1.0])
     height = _heights(last, normal, plane)
     flat = last - height[..., None] * normal - foot
-    if model.flight is not None:
+    drift = jnp.zeros(3, last.dtype)
+    if along is not None:
         # in a wind the stagnation point goes with the turn; in none it stays on the shaft, as in hover
+        drift = _drift(along, psi)
         drift = drift - (drift @ normal) * normal
         share = (along @ along) / (along @ along + STILL**2)
         foot = foot + share * jnp.mean(flat, axis=1, keepdims=True)
@@ -104,7 +114,12 @@ def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, "
     downhill = normal - np.array([0.0, 0.0, 1.0]) / normal[2]
     run = REACH * _along(x[:, None], lower)[..., None] * downhill
     spread = (flat[:, None] + run) * wider[..., None] + REACH * lower[..., None] * normal
-    return _in_line(model, foot + after[..., None] * drift + spread)
+    return foot + after[..., None] * drift + spread
+
+
+def _drift(along: Float[Array, " 3"], psi: Float[Array, ""]) -> Float[Array, " 3"]:
+    """How far the wind carries a turn in a revolution, in the blade's frame."""
+    return 2 * jnp.pi * rotate_about_shaft(along, -psi)
 
 
 def _in_line(model: FreeWake, turns: Float[Array, "F K N 3"]) -> Float[Array, "F C 3"]:

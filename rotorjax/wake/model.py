@@ -18,11 +18,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from rotorjax.checks import array, known, refuse, shown
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.operating import OperatingPoint
-from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
+from rotorjax.operating import OperatingPoint, check_still
+from rotorjax.panels.surface import Panels, Solid, check_clear, check_panels, floor, solid
 from rotorjax.rotor import geometry
 from rotorjax.rotor.derived import check_rotor
 from rotorjax.rotor.geometry import Rotor
@@ -201,7 +201,7 @@ def free_wake(
     settings = settings.for_blades(rotor.blades)
     check_rotor(rotor, operating)
     if ground is not None:
-        _check_climb(operating)
+        check_still(operating)
     if settings.azimuths % rotor.blades:
         raise InputError(
             f"Argument `settings` must have azimuths that are a multiple of the {rotor.blades} blades, "
@@ -222,17 +222,8 @@ def among_settings() -> WakeSettings:
 
 def check_surfaces(surfaces: Panels, operating: OperatingPoint) -> None:
     """Raise InputError where surfaces are no panels or the rotor climbs past them."""
-    if not isinstance(surfaces, Panels):
-        raise refuse("surfaces", "be made by rj.box, slab, wall, terrain or read_stl", shown(surfaces))
-    _check_climb(operating)
-
-
-def _check_climb(operating: OperatingPoint) -> None:
-    if known(operating.climb) and float(operating.climb) != 0:
-        raise InputError(
-            f"Argument `operating` must not climb over ground or surfaces (a steady state needs a fixed height), "
-            f"but its climb is {float(operating.climb)} m/s: set climb = 0 or leave the ground out"
-        )
+    check_panels(surfaces)
+    check_still(operating)
 
 
 def along_blade(r: Float[Array, " N"]) -> Float[Array, "N 3"]:

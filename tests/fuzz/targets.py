@@ -308,7 +308,7 @@ harmonics = 1
 duration = 4.0
 [path]
 t = [0.0, 1.0, 3.0, 4.0]
-height = [2.0, 2.0, 0.8, 0.8]
+height = [1.6, 1.6, 1.4, 1.4]
 edge = [-1.5, -1.5, 1.5, 1.5]
 [deck]
 heave = 0.06

@@ -6,11 +6,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rotorjax.calibration.calibration_file import load as load_calibration
+from rotorjax.deck.case import read_case as read_deck
 from rotorjax.errors import InputError
 from rotorjax.rotor import catalogue
+from rotorjax.simulation.case import read_case as read_flight
 from rotorjax.trim.solve import flight
 from tests.fuzz.__main__ import run
-from tests.fuzz.targets import TARGETS, refusal
+from tests.fuzz.targets import CALIBRATION, DECK, FLIGHT, TARGETS, refusal
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda t: t.__name__)
@@ -18,6 +21,13 @@ def test_generated_inputs_are_refused_or_make_sense(target):
     counts, findings = run(25, seed=1000, only=target.__name__)
     assert not findings, findings[0]
     assert sum(counts.values()) == 25
+
+
+def test_what_is_spoiled_was_right(tmp_path):
+    """A file that is refused as it stands would hide what spoiling it does."""
+    for text, read in ((DECK, read_deck), (FLIGHT, read_flight), (CALIBRATION, load_calibration)):
+        (tmp_path / "file.toml").write_text(text)
+        read(tmp_path / "file.toml")
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -145,3 +145,92 @@ def test_c81_refuses_what_its_format_cannot_hold(tmp_path):
     big = (small[0], small[1], np.array([[0.0], [1e9]]))
     with pytest.raises(InputError, match="seven characters"):
         c81.write_c81(tmp_path / "a.c81", c81.C81("x", big, small, small))
+
+
+ROWS = [(-180, 0, 0.1), (-10, -1, 0.02), (0, 0, 0.01), (10, 1, 0.02), (180, 0, 0.1)]
+
+
+def as_csv(rows, header, end=""):
+    return "\n".join([header, *(",".join(map(str, row)) + end for row in rows)]) + "\n"
+
+
+def read(tmp_path, text, name="a.csv"):
+    (tmp_path / name).write_text(text)
+    return io.read_section(tmp_path / name)
+
+
+def test_a_mach_column_makes_a_table_over_mach(tmp_path):
+    """In blocks of any order, or side by side; not one angle may be missing."""
+    rows = [(a, m, cl * (1 + m), cd) for m in (0.6, 0.3) for a, cl, cd in ROWS]
+    for order in (rows, sorted(rows)):
+        (alpha, mach, cl), (_, _, cd) = read(tmp_path, as_csv(order, "alpha_deg,mach,cl,cd"))
+        np.testing.assert_array_equal(mach, [0.3, 0.6])
+        np.testing.assert_allclose(cl[alpha == 10], [[1.3, 1.6]])
+        np.testing.assert_allclose(cd[:, 1], [row[2] for row in ROWS])
+    with pytest.raises(InputError, match=r"must be the same for every Mach number, but at 0.6 there are 4"):
+        read(tmp_path, as_csv(rows[1:], "alpha_deg,mach,cl,cd"))
+    with pytest.raises(InputError, match=r"line 3: alpha_deg at Mach 0.6 must increase"):
+        read(tmp_path, as_csv([*rows[1::-1], *rows[2:]], "alpha_deg,mach,cl,cd"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        as_csv(ROWS, "Alpha_Deg,CL,CD"),
+        as_csv(ROWS, "alpha_deg,cl,cd,", ","),
+        as_csv(ROWS, "! a note\n% another\nalpha_deg,cl,cd") + ",,\n,,\n",
+        as_csv(ROWS, "alpha_deg,cl,cd").replace("0.02", "2.0D-02"),
+    ],
+    ids=["capitals", "an empty column", "notes and empty rows", "fortran"],
+)
+def test_what_spreadsheets_and_fortran_leave_is_read(tmp_path, text):
+    (alpha, _, cl), (_, _, cd) = read(tmp_path, text)
+    np.testing.assert_array_equal(np.column_stack([alpha, cl, cd]), np.array(ROWS, float))
+
+
+def test_an_airfoiltools_polar_is_read_with_its_mach_number(tmp_path):
+    head = "Xfoil polar. Reynolds number fixed. Mach number fixed\nAirfoil,n0012-il\nMach,0.2\n\n"
+    rows = [(a, cl, cd, 0, 0, 1, 1) for a, cl, cd in ROWS[1:4]]
+    (alpha, mach, cl), _ = read(tmp_path, as_csv(rows, head + "Alpha,Cl,Cd,Cdp,Cm,Top_Xtr,Bot_Xtr"))
+    np.testing.assert_array_equal(alpha, [-10, 0, 10])
+    np.testing.assert_array_equal(cl[:, 0], [-1, 0, 1])
+    assert mach == [0.2]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (as_csv(ROWS, "alpha,cl,cd"), "'alpha_deg' is not among .*: angles in degrees go under that name"),
+        (as_csv([(*row, 9) for row in ROWS], "alpha_deg,cl,cd,cl"), "each once, but 'cl' is there 2 times"),
+        (as_csv(ROWS[1:], "-180,0,0.1"), "line 1: the first line must name the columns, but holds"),
+        (as_csv(ROWS, "AeroDyn airfoil file, v13"), "must be of version 15 .* but is older"),
+    ],
+)
+def test_other_headers_are_refused_with_the_way_out(tmp_path, text, message):
+    with pytest.raises(InputError, match=f"a.csv.*{message}"):
+        read(tmp_path, text)
+
+
+def test_an_xfoil_polar_may_go_up_and_then_down(tmp_path):
+    """As ASEQ 0 10 and ASEQ 0 -10 leave it, zero there twice; of one Mach number."""
+    text = "XFOIL Version 6.99\nMach number fixed\nMach = 0.200\n\nalpha CL CD\n----- ---- ----\n"
+    text += "0 0 .01\n5 .5 .012\n10 1 .02\n0 0 .01\n-5 -.5 .012\n"
+    (alpha, mach, _), _ = read(tmp_path, text, "a.pol")
+    np.testing.assert_array_equal(alpha, [-5, 0, 5, 10])
+    assert mach == [0.2]
+    with pytest.raises(InputError, match="must be of type 1, but its Mach number changes with the lift"):
+        read(tmp_path, text.replace("number fixed", "number ~ 1/sqrt(CL)"), "a.pol")
+
+
+def test_an_aerodyn_table_longer_than_it_says_is_refused(tmp_path):
+    rows = "".join(f"{a} {cl} {cd} 0\n" for a, cl, cd in ROWS)
+    assert len(read(tmp_path, f"! AirfoilInfo\n5 NumAlf\n{rows}", "a.dat")[0][0]) == 5
+    with pytest.raises(InputError, match="line 6: NumAlf says 3 rows, but more follow"):
+        read(tmp_path, f"! AirfoilInfo\n3 NumAlf\n{rows}", "a.dat")
+
+
+def test_a_flat_plate_continues_no_half_of_a_section():
+    half = tuple((np.array([0.0, 10.0]), np.zeros(1), np.array(values)) for values in ([[0], [1]], [[0.01], [0.02]]))
+    with pytest.raises(InputError, match=r"both sides of 0 .* but runs from 0 to 10: give symmetric = true"):
+        full_range.completed(*half, "flat plate")
+    full_range.completed(*half, "flat plate", symmetric=True)

@@ -115,7 +115,7 @@ def test_an_inflow_model_is_marched_by_the_same_calls(level):
 
 def test_a_history_faster_than_the_steps_is_warned_of(level):
     t, columns = np.array([0.0, 0.1, 0.104, 1.0]), np.zeros((4, len(COLUMNS)))
-    columns[2:, 2] = 1.0
+    columns[2:, 2], columns[:, -1] = 1.0, 100.0
     case = SimulationCase(level.request, 1.0, None, t, columns)
     omega = 2 * np.pi / 0.24
     with pytest.warns(
@@ -123,6 +123,9 @@ def test_a_history_faster_than_the_steps_is_warned_of(level):
     ):
         check_histories(case, omega, 24)
     check_histories(case, omega, 60)
+    columns[:, 2] += 17.0
+    with pytest.warns(UserWarning, match=r"collective_deg begins at 17, a jump at the start.*added to the trim"):
+        check_histories(case, omega, 60)
 
 
 def test_late_frames_are_counted():

@@ -126,6 +126,7 @@ def test_derivative_of_power_at_trim(cruise):
         ({"inflow": "pit-peters"}, "pitt-peters"),
         ({"rotor": "caradonna_tung"}, "hinge"),
         ({"tilt_deg": 90.0}, "tilt"),
+        ({"tilt_deg": 3.0, "drag_area": 3.0}, "tilt_deg"),
         ({"height": 0.6, "tilt_deg": 39.0}, "height"),
     ],
 )

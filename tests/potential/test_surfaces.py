@@ -1,0 +1,162 @@
+"""Surfaces beside the finite-state flow: exact image, the ground's own sources, no flow through, mirrors, limits."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import rotorjax as rj
+from rotorjax.errors import InputError
+from rotorjax.panels.surface import Panels, normal_flow, refitted
+from rotorjax.potential import rigid_cylinder
+from rotorjax.potential.model import (
+    FiniteState,
+    answer_matrix,
+    disk_inflow,
+    finite_state_model,
+    steady_state,
+    unit_states,
+    velocity,
+)
+from rotorjax.potential.surfaces import RIM, shadow
+from rotorjax.region import half_plane
+
+CT = 0.006
+TAU = jnp.zeros(9).at[0].set(np.sqrt(3) / 4 * CT).at[1].set(5e-4).at[3].set(3e-4).at[6].set(-2e-4)
+X, Y = jnp.array([0.9, 0.2, -0.6, 0.1]), jnp.array([0.0, -0.7, 0.3, 0.8])
+GROUND = rj.plane(1.0)
+HANGAR = rj.wall(1.2, -1.0, 1.0, length=3.0, azimuth_deg=90.0, panel=0.5)
+
+
+def model(ground=None, surfaces=None, **settings):
+    return finite_state_model(ground, harmonics=1, ground_harmonics=1, surfaces=surfaces, **settings)
+
+
+def round_patch(rings: int, outside: int = 0) -> Panels:
+    """A flat disk a radius below the hub, of radius 1 or with more rings to 8; panels even where loads are smooth."""
+    r = np.sqrt(1 - np.linspace(1, 0, rings + 1) ** 2)
+    r = np.append(r, np.geomspace(1, 8, outside + 1)[1:])
+    psi = np.linspace(0, 2 * np.pi, 4 * rings + 1)
+    x, y = r[:, None] * np.cos(psi), r[:, None] * np.sin(psi)
+    node = np.stack([x, y, np.full_like(x, -1.0)], axis=-1)
+    a, b, c, d = (v.reshape(-1, 3) for v in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]))
+    return Panels(jnp.asarray(np.stack([a, b, c, d], axis=1)))
+
+
+def test_a_large_plane_of_panels_is_the_exact_image_of_the_rigid_cylinder():
+    """The error falls with the panels' number, to a hundredth of the ground's upflow; the states of all kinds."""
+    exact = model(GROUND, wake=None)
+    a = jnp.array([1.0, 0.2, 0.1, 0.3, 0.0, 0.0, -0.2, 0.0, 0.0])
+    wanted = rigid_cylinder.disk_inflow(FiniteState(a, jnp.zeros(1)), X, Y, exact)
+    alone = disk_inflow(FiniteState(a, jnp.zeros(7)), X, Y, model(wake=None))
+    off = []
+    for rings in (6, 12):
+        flat = model(None, round_patch(rings, rings), wake=None)
+        found = disk_inflow(FiniteState(a, answer_matrix(flat) @ a), X, Y, flat)
+        off.append(float(jnp.max(jnp.abs(found - wanted)) / jnp.max(jnp.abs(alone - wanted))))
+    assert off[1] < 0.5 * off[0], off
+    assert off[1] < 0.01, off
+
+
+def test_a_patch_of_the_ground_disks_size_is_the_ground_of_the_models_own_sources():
+    """Both close the footprint alone: panels of constant density tend to the modes with their number."""
+    own = unit_states(model(GROUND, wake=None, ground_radius=1.0)).up
+    off = [jnp.abs(unit_states(model(None, round_patch(rings), wake=None)).up - own) for rings in (4, 8)]
+    assert bool(jnp.all(off[1][:3] < 0.5 * off[0][:3])), off
+    assert bool(jnp.all(off[1] < 0.015 * own[0])), (off, own)
+
+
+def test_no_air_goes_through_a_panels_middle():
+    """The whole velocity there, its own panel's share the limit from the air; more panels without, less in between."""
+    house = HANGAR + rj.box((-0.5, -2.0, -1.0), (1.0, 0.4, -0.5), panel=0.5)
+    among = model(GROUND, house)
+    state, panels = steady_state(among, TAU), among.surfaces.panels
+    density = state.c[len(among.sources) :]
+    blown = jnp.sum(velocity(state, panels.middles, among) * panels.normals, axis=1)
+    np.testing.assert_allclose(blown, -0.5 * density, atol=1e-12)
+    assert float(jnp.max(jnp.abs(normal_flow(panels, GROUND, density)))) > 1e-3
+
+
+def test_what_lies_in_a_surfaces_shadow_sees_no_jet():
+    """On the ground under a deck, on its lower side and behind it is none of the column's air; beside it is all."""
+    deck = rj.slab((-12.0, -12.0), (0.5, 12.0), -0.5, 0.2, panel=0.5)
+    x = jnp.array([-0.4, 0.5 - 1.01 * RIM, 0.5, 0.5 + 1.01 * RIM, 0.8])
+    under = jnp.stack([x, 0.1 + 0 * x, 0 * x - 1.0], axis=-1)
+    np.testing.assert_allclose(shadow(deck, under), [1.0, 1.0, 0.5, 0.0, 0.0], atol=0.02)
+    upright = deck.normals[:, 2]  # nothing falls on the sides
+    level = np.abs(upright) > 0.5
+    np.testing.assert_array_equal(shadow(deck, deck.middles)[level], jnp.where(upright < 0, 1.0, 0.0)[level])
+    hill = rj.terrain(
+        [-2, -1, 0, 1, 2], [-1, 0, 1], -1.0 + 0.4 * np.array([[0, 0, 0], [1, 1, 1], [0, 2, 0], [1, 1, 1], [0, 0, 0]])
+    )
+    np.testing.assert_array_equal(shadow(hill, hill.middles), 0.0)
+
+
+def test_a_wall_to_port_is_one_to_starboard_in_a_mirror():
+    """cos terms stay, sin terms change sign."""
+    sides = [model(GROUND, HANGAR), model(GROUND, Panels((HANGAR.corners * jnp.array([1, -1, 1]))[:, ::-1]))]
+    sign = jnp.where(jnp.arange(9) >= 6, -1.0, 1.0)
+    flows = [
+        disk_inflow(steady_state(side, tau), X, s * Y, side)
+        for side, tau, s in zip(sides, (TAU, sign * TAU), (1, -1), strict=True)
+    ]
+    np.testing.assert_allclose(flows[0], flows[1], atol=1e-14)
+    assert float(jnp.max(jnp.abs(flows[0] - disk_inflow(steady_state(model(GROUND), TAU), X, Y, model(GROUND))))) > 1e-4
+
+
+def test_a_wall_far_away_changes_nothing():
+    alone, beside = model(GROUND), model(GROUND, HANGAR.moved((0.0, 30.0, 0.0)))
+    points = jnp.array([[0.3, 0.2, 0.4], [0.2, 0.1, -0.7], [-1.4, 0.3, -0.5]])
+    flows = [disk_inflow(steady_state(m, TAU), X, Y, m) for m in (alone, beside)]
+    np.testing.assert_allclose(flows[1], flows[0], atol=1e-6)
+    axial = [velocity(steady_state(m, TAU), points, m)[:, 2] for m in (alone, beside)]
+    np.testing.assert_allclose(axial[1], axial[0], atol=1e-6)
+
+
+def test_derivatives_by_the_place_of_surfaces():
+    """Compiled, many at once and in reverse, against differences: of a wall and of a deck whose shadow moves."""
+    both = HANGAR + rj.slab((-3.0, -1.0), (0.3, 0.5), -0.5, 0.3, panel=0.8)
+    among = finite_state_model(GROUND, 0, 1, 1, 2, surfaces=both)
+    way = jnp.array([0.8, 0.5, 0.3])
+
+    def inflow(by):
+        solid = eqx.tree_at(lambda s: s.panels, among.surfaces, among.surfaces.panels.moved(by * way))
+        here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, GROUND))
+        return disk_inflow(steady_state(here, TAU[:1]), X, Y, here) @ (X + Y) / jnp.sqrt(CT / 2)
+
+    step = 1e-5
+    value, slope = jax.jit(jax.vmap(jax.value_and_grad(inflow)))(0.02 + step * jnp.array([-1, 0, 1]))
+    assert abs(float(slope[1])) > 1e-3
+    np.testing.assert_allclose(slope[1], (value[2] - value[0]) / (2 * step), rtol=1e-6)
+
+
+def test_a_rotors_thrust_rises_as_a_roof_comes_under_it():
+    """By the front door: more of the roof under the disk, more thrust; and a load where the roof is."""
+    rotor, hover = rj.rotor("knight_hefner_2", 8.0)
+    roof = rj.slab((-3.0, -2.0), (0.0, 2.0), -0.7, panel=0.6)
+    none, half, whole = (
+        rj.solve(rj.finite_state(rotor, hover, surfaces=surfaces))
+        for surfaces in (None, roof, roof.moved((2.0, 0.0, 0.0)))
+    )
+    assert float(none.CT) < float(half.CT) < float(whole.CT)
+    ahead, aft = (half.dct_dr[np.abs(np.cos(half.psi) - sign) < 0.1].mean(axis=0) for sign in (-1, 1))
+    assert bool(jnp.all(ahead[24:] > aft[24:]))
+
+
+def test_errors():
+    rotor, hover = rj.rotor("knight_hefner_2", 8.0, climb=1.0)
+    with pytest.raises(InputError, match="climb over ground or surfaces"):
+        rj.finite_state(rotor, hover, surfaces=HANGAR)
+    with pytest.raises(InputError, match="must be level beside surfaces, but its slope is 10 deg"):
+        model(rj.plane(1.0, 10.0), HANGAR)
+    with pytest.raises(InputError, match="must be 'odd' beside surfaces"):
+        model(GROUND, HANGAR, printed=True)
+    with pytest.raises(InputError, match="keep clear of the disk"):
+        model(None, HANGAR.moved((0.0, -0.5, 0.0)))
+    with pytest.raises(InputError, match="`region` must be left out"):
+        model(GROUND, HANGAR, region=half_plane(0.0))
+    with pytest.raises(InputError, match="`even_terms` must be 0"):
+        model(None, HANGAR, even_terms=1)
+    with pytest.raises(InputError, match=r"be made by rj\.box"):
+        model(None, "wall")
