@@ -1,6 +1,7 @@
 """A rotor, and the two models of the inflow that it makes."""
 
 from pathlib import Path
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -91,5 +92,5 @@ def finite_state(
     """
     if surfaces is not None:
         check_still(operating)
-    sizes = dict(zip(SIZES, (harmonics, 7) if surfaces is None else IN_SHADOW, strict=True))
+    sizes: dict[str, Any] = dict(zip(SIZES, (harmonics, 7) if surfaces is None else IN_SHADOW, strict=True))
     return FiniteState(rotor, operating, finite_state_model(ground, harmonics, surfaces=surfaces, **sizes | settings))

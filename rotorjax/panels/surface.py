@@ -76,6 +76,15 @@ class Panels(eqx.Module):
         thirds = jnp.stack([self.corners[:, :3].mean(axis=1), self.corners[:, np.array([0, 2, 3])].mean(axis=1)])
         return jnp.sum(share[..., None] * thirds, axis=0)
 
+    def spots(self, count: int) -> tuple[Float[Array, "P K 3"], Float[Array, "P K"]]:
+        """K = count² points spread over each panel, and the share of its area that each stands for."""
+        u, v = (w.ravel()[:, None] for w in np.meshgrid(*2 * [(np.arange(count) + 0.5) / count]))
+        a, b, c, d = (w[:, None] for w in jnp.moveaxis(self.corners, 1, 0))
+        points = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)
+        patch = jnp.cross((1 - v) * (b - a) + v * (c - d), (1 - u) * (d - a) + u * (c - b))
+        area = jnp.linalg.norm(patch, axis=-1)
+        return points, area / jnp.sum(area, axis=1, keepdims=True)
+
     def moved(self, by: ArrayLike | Sequence[ArrayLike]) -> "Panels":
         """The same surface elsewhere, over R."""
         return Panels(self.corners + jnp.asarray(by, float))

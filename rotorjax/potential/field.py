@@ -14,6 +14,7 @@ from math import factorial, log, pi, sqrt
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.potential.ellipsoidal import Ellipsoidal, ellipsoidal
@@ -33,8 +34,10 @@ def _harmonics(highest: int, at: Ellipsoidal) -> tuple[list[Array], list[Array]]
 
 def _by_mode(modes: ModeTable, radial: Float[Array, "L ..."], at: Ellipsoidal) -> Float[Array, "M ..."]:
     """Multiply functions of (ν, η), one for each pair of `modes`, by (1−ν²)^{m/2} {cos, sin} mψ."""
-    cosines, sines = _harmonics(int(modes.m.max()), at)
-    angular = jnp.stack([(cosines if mode.kind == "cos" else sines)[mode.m] for mode in modes.modes])
+    highest = int(modes.m.max())
+    cosines, sines = _harmonics(highest, at)
+    both = jnp.stack(cosines + sines)
+    angular = both[np.array([mode.m + (highest + 1) * (mode.kind == "sin") for mode in modes.modes])]
     return radial[modes.pair_index] * angular
 
 
@@ -100,16 +103,19 @@ def velocity_potentials(
     at = ellipsoidal(points)
     needed = [(m, n + 1) for m, n in modes.pairs] + [(m, n - 1) for m, n in modes.pairs if n > m]
     pairs = tuple(dict.fromkeys(needed))
-    radial = dict(zip(pairs, _radial(pairs, at), strict=True))
-    rows = []
-    for m, n in modes.pairs:
-        row = sigma(m, n) * radial[m, n + 1]
-        if n > m:
-            row = row + zeta(m, n) * radial[m, n - 1]
-        else:
-            row = row + _diagonal_remainder(m, at) + (2 / pi * log(outer_radius) if m == 0 else 0.0)
-        rows.append(row)
-    return _by_mode(modes, jnp.stack(rows), at)
+    radial = _radial(pairs, at)
+    above = np.array([pairs.index((m, n + 1)) for m, n in modes.pairs])
+    below = np.array([pairs.index((m, n - 1)) if n > m else 0 for m, n in modes.pairs])
+    column = (-1,) + (1,) * at.nu.ndim
+    up, down = (
+        jnp.asarray(factors, radial.dtype).reshape(column)
+        for factors in ([sigma(m, n) for m, n in modes.pairs], [zeta(m, n) if n > m else 0.0 for m, n in modes.pairs])
+    )
+    rows = up * radial[above] + down * radial[below]
+    for k, (m, n) in enumerate(modes.pairs):
+        if n == m:
+            rows = rows.at[k].add(_diagonal_remainder(m, at) + (2 / pi * log(outer_radius) if m == 0 else 0.0))
+    return _by_mode(modes, rows, at)
 
 
 def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:

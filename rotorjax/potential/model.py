@@ -55,6 +55,7 @@ MassFlow = Literal["harmonics", "paper", "linear"]
 Strengths = Literal["closed", "printed"]
 Slope = Literal["tilted", "sheared"]
 MEAN = DiskQuadrature(16, 16)  # of the sources' upflow, smooth on the disk
+SPOTS = 4  # along each side of a panel, for the mean of the wake's column over it
 LOWEST_EVEN = 0.2
 NO_THRUST = 1e-10  # of C_T/2: below it V, which has no derivative there, stays at 1e-5
 
@@ -342,7 +343,17 @@ def answer_matrix(model: FiniteStateModel) -> Float[Array, "S M"]:
         return of_ground
     panels = model.surfaces.panels
     through = jnp.einsum("amp,pa->mp", _open_flow(model, of_ground, panels.middles), panels.normals)
+    through = through - _spread(model, panels) * panels.normals[:, 2]
     return jnp.concatenate([of_ground, beside.answers(model.surfaces, through, model.ground)])
+
+
+def _spread(model: FiniteStateModel, panels: Panels) -> Float[Array, "M P"]:
+    """What the wake's column, whose rim is sharp, brings each panel in the mean more than its middle."""
+    points, shares = panels.spots(SPOTS)
+    places = jnp.concatenate([points, panels.middles[:, None]], axis=1)
+    column = _in_wake(model, model.ground, column_functions, places)
+    more = jnp.sum(column[..., :-1] * shares, axis=-1) - column[..., -1]
+    return more * (1 - beside.shadow(panels, panels.middles))
 
 
 def _open_flow(
