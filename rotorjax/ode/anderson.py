@@ -19,29 +19,44 @@ parallel to each other, and what is left between them is curvature, which leads 
 
 
 class _Window:
-    """The last differences of iterates and residuals, columns of two tall matrices."""
+    """The last differences of iterates and residuals, a row each, and the products of the latter with each other."""
 
-    def __init__(self, size: int) -> None:
-        self.size = size
+    def __init__(self, size: int, length: int) -> None:
+        self.dx, self.df = np.empty((2, size, length))
+        self.products = np.empty((size, size))
         self.clear()
 
     def clear(self) -> None:
-        self.dx: list[np.ndarray] = []
-        self.df: list[np.ndarray] = []
+        self.pushed = 0
 
+    @one_thread
     def push(self, dx: np.ndarray, df: np.ndarray) -> None:
-        self.dx, self.df = [*self.dx, dx][-self.size :], [*self.df, df][-self.size :]
+        row = self.pushed % len(self.df)
+        self.dx[row], self.df[row] = dx, df
+        self.pushed += 1
+        kept = self.kept
+        self.products[row, :kept] = self.products[:kept, row] = self.df[:kept] @ df
+
+    @property
+    def kept(self) -> int:
+        return min(self.pushed, len(self.df))
 
     @one_thread
     def advance(self, x: np.ndarray, f: np.ndarray, mixing: float) -> np.ndarray:
-        """Next iterate: the combination of past residuals that is least, plus `mixing` of what is left of it."""
-        if not self.dx:
-            return x + mixing * f
-        dx, df = np.stack(self.dx, axis=1), np.stack(self.df, axis=1)
-        sizes = np.linalg.norm(df, axis=0)
+        """Next iterate: the combination of past residuals that is least, plus `mixing` of what is left of it.
+
+        From the normal equations, of which a pass adds one row: with what is ALIKE dropped they lose six digits of
+        sixteen, and take a tenth of the time of the singular values of all differences.
+        """
+        kept = self.kept
+        dx, df, products = self.dx[:kept], self.df[:kept], self.products[:kept, :kept]
+        sizes = np.sqrt(np.diag(products))
         sizes[sizes == 0] = 1.0
-        weights = np.linalg.lstsq(df / sizes, f, rcond=ALIKE)[0] / sizes
-        return x + mixing * f - (dx + mixing * df) @ weights
+        squares, ways = np.linalg.eigh(products / np.outer(sizes, sizes))
+        unlike = squares > ALIKE**2 * squares.max(initial=0.0)
+        ways, squares = ways[:, unlike], squares[unlike]
+        weights = ways @ (ways.T @ ((df @ f) / sizes) / squares) / sizes
+        return x + mixing * f - weights @ dx - mixing * (weights @ df)
 
 
 def anderson(
@@ -85,8 +100,8 @@ def anderson(
             return np.asarray(linear.at(g, unravel, point, args)[0])
         return np.asarray(flat_residual(g, unravel, point, args)) - x
 
-    past, share = _Window(window), mixing
     x = np.asarray(flat)
+    past, share = _Window(window, x.size), mixing
     with Log("anderson", attainable(tol, flat.dtype), max_iterations, progress) as log:
         f = residual(x)
         best_f = f

@@ -3,8 +3,9 @@
 From a trim nearby the way leads straight to the case, the wake carried by what the wind changes. From nothing, in hover
 the wake is first solved for on rigid blades (wake/solution.py), with its own continuation. In a wind it starts from a
 prescribed one with thick cores, which thin as passes of the fixed point go on under Anderson's iteration. Where that is
-lost they thin in careful steps. Where there is none with thick cores it starts far over the ground in an auxiliary flow
-down that carries the wake away, and follows the branch as the flow is taken back and the ground comes up.
+lost they thin in careful steps, at last with those harmonics damped that the azimuths hardly hold. Where there is none
+with thick cores it starts far over the ground in an auxiliary flow down that carries the wake away, and follows the
+branch as the flow is taken back and the ground comes up.
 """
 
 from collections.abc import Callable
@@ -41,9 +42,9 @@ Progress = Callable[[str, float], None]
 TOL = 1e-7
 """Relative rms of the residual of wake, blades and controls together."""
 
-ROUGH, CLOSE, NEAR = 1e-3, 2e-4, 5e-3
-"""The same on the way to the case, quickly and carefully, and where to go on all the same: from further off no search
-has arrived.
+ROUGH, CLOSE, TIGHT, NEAR = 1e-3, 2e-4, 1e-5, 5e-3
+"""The same on the way to the case, quickly, carefully and with the highest harmonics damped, and where to go on all the
+same: from further off no search has arrived.
 """
 
 SHARE, WINDOW, PASSES = 0.1, 100, 250
@@ -63,8 +64,14 @@ THICK = 4.0
 the fixed point converge from a prescribed wake, in slow flight and near the ground, too.
 """
 
-QUICK, CAREFUL = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1)
-"""Cores on the way, on the first one and where that is lost."""
+QUICK, CAREFUL, FINE = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1), (THICK, 3.0, 2.3, 1.8, 1.4, 1.2)
+"""Cores on the way: on the first one, where that is lost, and with the highest harmonics damped."""
+
+DAMPED = 0.3
+"""Damping of the highest harmonic over the azimuth (`azimuth_damping`) for a wake that is not found without: beside the
+disk in slow flight vortices lie within each other's cores, and what neighbouring azimuths' do there to each other,
+twelve of them do not resolve; nothing else damps it, and the branch folds again and again.
+"""
 
 WASHOUT, FAR = 0.08, 4.0
 """Auxiliary flow (over ΩR) and height (over R) that a search begins with where it is lost without."""
@@ -260,7 +267,9 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
 
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
-    """From a wake with thick cores as these thin, quickly, and where that is lost in careful steps."""
+    """From a wake with thick cores as these thin, quickly; where that is lost in careful steps; where those are, too,
+    with the highest harmonics over the azimuth damped.
+    """
     thick = _with_cores(replace(p, aim="flapping"), THICK)
     start = stages.passes("thick cores", _prescribed(thick, controls, coning), thick, ROUGH)
     if not (start.converged or stages.interrupted):
@@ -271,7 +280,18 @@ def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimmed
         found = _thinner(p, start.x, cores, rough, stages)
         if found.converged or stages.interrupted:
             return TrimmedInWake(found.x, p, found, stages.iterations)
-    return _lost(found.x, found.why, p, stages)
+    damped = _damped(p)
+    again = _thinner(damped, start.x, FINE, TIGHT, stages)
+    if again.converged or stages.interrupted:
+        return TrimmedInWake(again.x, damped, again, stages.iterations)
+    return _lost(found.x, f"{found.why}; with the highest harmonics damped {again.why}", p, stages)
+
+
+def _damped(p: WakeTrim) -> WakeTrim:
+    """The trim with the highest harmonics over the azimuth damped, by no less than asked for."""
+    settings = p.model.settings
+    damped = replace(settings, azimuth_damping=max(DAMPED, settings.azimuth_damping))
+    return replace(p, model=replace(p.model, settings=damped))
 
 
 def _thinner(p: WakeTrim, z: InWake, cores: tuple[float, ...], rough: float, stages: _Stages) -> Outcome:
@@ -290,6 +310,7 @@ def _among(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWa
     found = _from_wind(open_air, controls, coning, stages)
     if not found.outcome.converged:
         return replace(found, outcome=replace(found.outcome, why=f"without surfaces: {found.outcome.why}"))
+    p = replace(p, model=replace(p.model, settings=found.p.model.settings))
 
     def at(s: float) -> WakeTrim:
         return eqx.tree_at(lambda q: q.model.surfaces.share, p, jnp.asarray(s, float))

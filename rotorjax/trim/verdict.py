@@ -30,13 +30,15 @@ class Verdict:
 
     load_change: largest relative change of C_T and C_P in PASSES passes of the wake through its own velocities; with an
     inflow model what is left of the equations (angles in rad, thrust over the wanted one). node_movement: rms way over
-    R that the wake's nodes go in the first pass; None without a wake.
+    R that the wake's nodes go in the first pass; None without a wake. damping: of the wake's highest harmonics over the
+    azimuth, which slow flight may need (docs/free_wake.md).
     """
 
     word: Word
     why: str
     load_change: float
     node_movement: float | None
+    damping: float = 0.0
 
     def __str__(self) -> str:
         """One sentence."""
@@ -47,7 +49,8 @@ class Verdict:
             "goes on"
         )
         if self.word == "converged":
-            return f"converged: {moving}"
+            how = f" with its highest harmonics damped (azimuth_damping = {self.damping:g})" if self.damping else ""
+            return f"converged{how}: {moving}"
         if self.word == "stalled":
             return f"STALLED, but with loads good to about {100 * self.load_change:.1g} %: {moving}; {self.why}"
         return f"NO SOLUTION found: {self.why}; there {moving}"
@@ -60,7 +63,8 @@ def verdict(found: Trimmed | TrimmedInWake) -> Verdict:
         return Verdict("converged" if outcome.converged else "no solution", outcome.why, outcome.residual, None)
     change, moved = _watched(found)
     word: Word = "stalled" if change <= USEFUL else "no solution"
-    return Verdict("converged" if outcome.converged else word, outcome.why, change, moved)
+    damping = found.p.model.settings.azimuth_damping
+    return Verdict("converged" if outcome.converged else word, outcome.why, change, moved, damping)
 
 
 def _watched(found: TrimmedInWake) -> tuple[float, float]:

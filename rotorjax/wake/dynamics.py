@@ -30,8 +30,9 @@ def operators(model: FreeWake) -> tuple[AgeOperator, AgeOperator]:
     """Age differences of the near wake and of the far filaments."""
     settings = model.settings
     grid = settings.far_grid if settings.stretch > 1 else None
-    near = age_operator(settings.near_ages, settings.age_step)
-    return near, age_operator(settings.far_ages, settings.age_step, grid)
+    step, damping = settings.age_step, settings.azimuth_damping
+    near = age_operator(settings.near_ages, step, damping=damping)
+    return near, age_operator(settings.far_ages, step, grid, damping)
 
 
 def leading_lines(model: FreeWake, count: int) -> Float[Array, "K R1 3"]:

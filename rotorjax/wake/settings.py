@@ -69,6 +69,9 @@ class WakeSettings(eqx.Module):
             equilibrium, and nothing faster than the time constant.
         pair_sums: how velocities are summed over the segments, "rows" to the last digit or "products" in half the time
             (`biot_savart.segment_velocity`).
+        azimuth_damping: rate per rad at which the highest harmonic that `azimuths` hold fades in a periodic wake, the
+            p-th by (2p/azimuths)⁴ of it. 0: none. Trims in slow flight that are lost without take 0.3
+            (docs/free_wake.md); marches have none.
 
     Arrays (differentiable; lengths over R):
         release: span station of the tip vortex's release, near the centroid of what it gathers, which is at 0.98 for
@@ -117,6 +120,7 @@ class WakeSettings(eqx.Module):
     roll_up: RollUp = eqx.field(static=True, default="impulse")
     bound_filter: BoundFilter = eqx.field(static=True, default="pass")
     pair_sums: PairSums = eqx.field(static=True, default="rows")
+    azimuth_damping: float = eqx.field(static=True, default=0.0)
     release: Number = 0.971
     release_band: Number = 0.0165
     sharpness: Number = 20.0
@@ -220,6 +224,7 @@ def _check_counts(settings: WakeSettings) -> None:
     for name, fewest, most in _COUNTS:
         if (value := getattr(settings, name)) is not None:
             check_whole(name, value, fewest, most)
+    check_range("azimuth_damping", settings.azimuth_damping, _AT_LEAST_0)
     step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))

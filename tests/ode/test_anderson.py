@@ -111,7 +111,7 @@ def test_a_residual_for_newton_gives_the_same_iterates(linear):
 
 def test_differences_that_hardly_disagree_do_not_throw_the_iterate():
     """What is left between two parallel ones is curvature: solved for, it makes a step of 10⁴."""
-    past = _Window(5)
+    past = _Window(5, 2)
     for change in ([-1.0, 0.0], [-1.0, 1e-4]):
         past.push(np.array([1.0, 0.0]), np.array(change))
     np.testing.assert_allclose(past.advance(np.zeros(2), np.array([0.0, 1.0]), 0.1), [0.0, 0.1], atol=1e-3)

@@ -24,7 +24,9 @@ from rotorjax.trim.in_wake import (
     QUICK,
     ROUGH,
     THICK,
+    TOL,
     _by_way_of_washout,
+    _damped,
     _Stages,
     _thinner,
     _with_cores,
@@ -197,6 +199,17 @@ def test_a_trim_says_what_it_is_worth(cruise, told):
     assert "loads good to about" in str(early)
     assert far.word == "no solution"
     assert "called off" in str(far)
+
+
+@pytest.mark.slow
+def test_damping_the_highest_harmonics_is_told_and_changes_little(cruise):
+    damped = _damped(cruise.trimmed.p)
+    outcome = _Stages(None).found("trim", cruise.trimmed.z, damped, TOL)
+    found = replace(cruise.trimmed, z=outcome.x, p=damped, outcome=outcome)
+    assert "converged with its highest harmonics damped (azimuth_damping = 0.3)" in str(verdict(found))
+    assert str(verdict(cruise.trimmed)).startswith("converged: ")
+    assert not np.allclose(found.z.wake.far, cruise.trimmed.z.wake.far, atol=1e-5)
+    np.testing.assert_allclose(means(found).CQ, cruise.means.CQ, rtol=0.01)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rotorjax.wake.age_grid import age_grid
-from rotorjax.wake.transport import age_operator, harmonics, lag, solve_nodes, solve_scalar
+from rotorjax.wake.transport import ORDER, age_operator, harmonics, lag, solve_nodes, solve_scalar
 
 
 def test_uniform_axial_flow_makes_a_helix_of_its_pitch():
@@ -62,6 +62,17 @@ def test_a_harmonic_of_bound_circulation_is_carried_back_unchanged():
     found = solve_scalar(operator, jnp.zeros((slices, 1, ages)), inlet)[:, 0]
     age = np.deg2rad(5.0) * np.arange(1, ages + 1)
     np.testing.assert_allclose(found, np.cos(psi[:, None] - age), atol=3e-5)
+
+
+@pytest.mark.parametrize(("slices", "rate"), [(12, 0.3 * (4 / 6) ** ORDER), (24, 0.3 * (4 / 12) ** ORDER)])
+def test_damping_takes_a_harmonic_away_with_age_as_the_order_says(slices, rate):
+    ages, step = 192, np.deg2rad(1.25)
+    inlet = jnp.asarray(np.cos(4 * 2 * np.pi / slices * np.arange(slices)))[:, None]
+    plain, damped = (
+        np.fft.fft(solve_scalar(age_operator(ages, step, damping=d), jnp.zeros((slices, 1, ages)), inlet)[:, 0], axis=0)
+        for d in (0.0, 0.3)
+    )
+    np.testing.assert_allclose(damped[4] / plain[4], np.exp(-rate * step * np.arange(1, ages + 1)), rtol=1e-5)
 
 
 def test_filter_delays_a_harmonic_as_a_first_order_lag_does():
