@@ -69,9 +69,9 @@ class WakeSettings(eqx.Module):
             equilibrium, and nothing faster than the time constant.
         pair_sums: how velocities are summed over the segments, "rows" to the last digit or "products" in half the time
             (`biot_savart.segment_velocity`).
-        azimuth_damping: rate per rad at which the highest harmonic that `azimuths` hold fades in a periodic wake, the
-            p-th by (2p/azimuths)⁴ of it. 0: none. Trims in slow flight that are lost without take 0.3
-            (docs/free_wake.md); marches have none.
+        azimuth_damping: rate per rad at which the highest harmonics that `azimuths` hold fade in a periodic wake, the
+            p-th by (2p/azimuths)⁴ of it, the lone highest, whose derivative counts as zero, not at all. 0: none. Trims
+            in slow flight that are lost without take 0.3 (docs/free_wake.md); marches have none.
 
     Arrays (differentiable; lengths over R):
         release: span station of the tip vortex's release, near the centroid of what it gathers, which is at 0.98 for

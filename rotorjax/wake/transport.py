@@ -56,10 +56,12 @@ def harmonics(slices: int) -> Float[np.ndarray, " K"]:
 
 
 def dampings(slices: int, highest: float) -> Float[np.ndarray, " K"]:
-    """Rate (per rad) at which each harmonic of K slices fades: `highest` at the highest one K/2, else `highest` times
-    (2p/K)^ORDER. A given harmonic's goes as K^−ORDER, the order of the differences in age.
+    """Rate (per rad) at which each harmonic p of K slices fades: `highest` (2p/K)^ORDER, with p as it is differenced.
+
+    So the lone harmonic K/2 keeps all of it. A given harmonic's rate goes as K^−ORDER, the order of the differences in
+    age.
     """
-    return highest * np.abs(2 * np.fft.fftfreq(slices)) ** ORDER
+    return highest * np.abs(2 * harmonics(slices) / slices) ** ORDER
 
 
 def _solved(matrix: Complex[np.ndarray, "A A"] | Float[np.ndarray, "A A"], source: Array, damping: float) -> Array:

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from rotorjax.wake.age_grid import age_grid
-from rotorjax.wake.transport import ORDER, age_operator, harmonics, lag, solve_nodes, solve_scalar
+from rotorjax.wake.transport import ORDER, age_operator, dampings, harmonics, lag, solve_nodes, solve_scalar
 
 
 def test_uniform_axial_flow_makes_a_helix_of_its_pitch():
@@ -86,3 +86,4 @@ def test_filter_delays_a_harmonic_as_a_first_order_lag_does():
 def test_the_lone_highest_harmonic_counts_as_zero():
     assert harmonics(4).tolist() == [0, 1, 0, -1]
     assert harmonics(1).tolist() == [0]
+    assert dampings(4, 16.0).tolist() == [0, 1, 0, 1]
