@@ -106,6 +106,7 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
         return
     with jax.ensure_compile_time_eval():  # numbers, inside of jit too
         found = derived(rotor, operating)
+        slope = lift_slope(rotor, _AT * found.tip_mach)
     if found.solidity > MOST_SOLIDITY:
         raise InputError(
             f"The solidity (blade area over disk area) must be at most {MOST_SOLIDITY:g}, but is {found.solidity:.3g}: "
@@ -117,7 +118,7 @@ def check_rotor(rotor: Rotor, operating: OperatingPoint) -> None:
             f"The tip Mach number must be at most {MOST_TIP_MACH:g}, but is {found.tip_mach:.3g}: check rpm ({rpm:g}) "
             f"and radius ({radius:g} m)"
         )
-    if (slope := lift_slope(rotor, _AT * found.tip_mach)) > MOST_SLOPE:
+    if slope > MOST_SLOPE:
         raise InputError(
             f"The lift slope at {_AT:g} R must be at most {MOST_SLOPE:g} per rad, but is {slope:.3g}: check that the "
             "airfoil's angles are in degrees"

@@ -206,6 +206,7 @@ RUNGS = [
     Rung(("field.velocity_potentials",), lambda v: flow.velocity_potentials(SOURCES, v), ABOVE),
     Rung(("field.velocity_functions",), lambda v: flow.velocity_functions(ROTOR, at(v)), ABOVE),
     Rung(("field.axial_functions",), lambda v: flow.axial_functions(ROTOR, at(v)), EVERYWHERE),
+    Rung(("field.column_functions",), lambda v: flow.column_functions(ROTOR, at(v)), EVERYWHERE),
     Rung(("field.field_functions",), lambda v: flow.field_functions(ROTOR, at(v)), EVERYWHERE),
     Rung(
         ("loading.shaping", "loading.azimuthal", "loading.distribution"),
@@ -330,6 +331,17 @@ RUNGS = [
             "below": ([1.1, 0.3, 0.8, 0.15, 0.5, 0.4, 0.3, -0.2], True),
             "above": ([1.1, 0.3, 0.8, 0.15, 0.5, 0.4, 0.3, 0.2], True),
         },
+    ),
+    Rung(
+        ("model.answer_matrix", "model.answer_upflow", "model.level_velocity", "ground_source.level_flow"),
+        lambda v: jnp.concatenate(
+            [
+                model.answer_upflow(contracting(v), model.answer_matrix(contracting(v)), v[None, 5:]).T,
+                model.level_velocity(contracting(v), ground_of(v), v[None, 5:])[:, :, 0],
+            ],
+            axis=None,
+        ),
+        {"above level ground": ([1.1, 0.0, 0.8, 0.15, 0.5, 0.4, 0.3, 0.2], True)},
     ),
     Rung(
         ("dynamics.rotor_rate",),
