@@ -105,7 +105,7 @@ BAD = {
     "inflow --rotor uh61": "did you mean 'uh60'",
     "inflow --rotor missing.toml": "missing.toml",
     "inflow --collective 100": "but is 100",
-    "inflow --climb 0.02 --height 1": "`climb` must be 0 over ground",
+    "inflow --climb 0.02 --height 1": "--climb must be 0 over ground",
     "inflow --harmonics 9 --height 1": "but is 9",
     "inflow --plot a.doc": "but is 'a.doc'",
     "inflow --model other": "invalid choice: 'other'",
