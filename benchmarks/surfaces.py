@@ -3,10 +3,9 @@
 Parts: limits (a large flat patch against the image), derivative (of C_T by the distance of a wall, implicit function
 theorem against differences; what goes through panels), cost (time over panels × targets), roof (a rotor that crosses
 the edge of a roof a radius below it) and hangar (one beside a wall, over its distance), both by the finite states too,
-wind (a UH-60 trimmed in a wind of 0.1 ΩR
-over the edge of a roof), passing (one that flies over a roof at that speed, marched). The last two have small wakes
-(`TINY`), the others Knight and Hefner's two-bladed rotor at 8° with a wake that keeps all of it to minutes: three free
-turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
+wind (a UH-60 trimmed in a wind of 0.1 ΩR over the edge of a roof), passing (one that flies over a roof at that speed,
+marched). The last two have small wakes (`TINY`), the others Knight and Hefner's two-bladed rotor at 8° with a wake that
+keeps all of it to minutes: three free turns, 8 azimuths, cores of 0.05 R (`SETTINGS`). --quick: fewer.
 """
 
 import argparse

@@ -69,16 +69,18 @@ def shown(value: object) -> str:
 
 def closest(word: str, allowed: Iterable[str]) -> str:
     """`Did you mean …?` where something allowed is close, else the list of what is allowed."""
-    allowed = list(allowed)
+    return _meant(word, allowed := list(allowed)) or "it must be one of " + ", ".join(allowed)
+
+
+def _meant(word: str, allowed: list[str]) -> str:
     near = difflib.get_close_matches(word[:100], allowed, n=1)
-    return f"did you mean '{near[0]}'?" if near else "it must be one of " + ", ".join(allowed)
+    return f"did you mean '{near[0]}'?" if near else ""
 
 
 def refuse_choice(name: str, found: object, allowed: Iterable[str]) -> InputError:
     """The error for a word that is none of those allowed, for the caller to raise."""
-    near = difflib.get_close_matches(str(found)[:100], allowed := list(allowed), n=1)
-    meant = f": did you mean '{near[0]}'?" if near else ""
-    return refuse(name, f"be one of {', '.join(allowed)}", shown(found) + meant)
+    meant = _meant(str(found), allowed := list(allowed))
+    return refuse(name, f"be one of {', '.join(allowed)}", shown(found) + (meant and f": {meant}"))
 
 
 def refuse(name: str, rule: str, found: str) -> InputError:

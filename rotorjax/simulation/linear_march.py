@@ -5,7 +5,7 @@
 
 Inputs are held over a step. With them the state obeys z' = M z, M = [[A, B], [0, 0]], z = (x, u), whose transition over
 a step is exp(dt M) where M is constant, and where it is periodic the exponential of Magnus' series to fourth order, on
-Gauss' two nodes (Blanes, Casas, Oteo & Ros 2009, doi:10.1016/j.physrep.2008.11.001, Eq. 253).
+Gauss' two nodes (Blanes, Casas, Oteo & Ros 2009, doi:10.1016/j.physrep.2008.11.001).
 """
 
 from dataclasses import dataclass, field, make_dataclass

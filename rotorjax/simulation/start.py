@@ -1,6 +1,7 @@
 """Where a flight starts: the trim that its case asks for, with any inflow."""
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -75,8 +76,15 @@ def from_trim(trimmed: Trimmed) -> Start:
 
 
 def from_wake(trimmed: TrimmedInWake) -> Start:
-    """Start from a trim in the free wake."""
+    """Start from a trim in the free wake. Warns where it is periodic with a damping that marches do not have."""
     model, p = trimmed.model, trimmed.p
+    if model.settings.azimuth_damping:
+        warnings.warn(
+            f"The trim is periodic with its wake's highest harmonics damped (azimuth_damping = "
+            f"{model.settings.azimuth_damping:g}); a march and a linear model have no such damping and drift from it. "
+            "For a trim without, try thicker cores ([wake] tip_core) or another speed",
+            stacklevel=3,
+        )
     tilt = 0.0 if p.inputs.pitch is None else -float(p.inputs.pitch)
     ground = model.ground if model.ground is None else pitched(model.ground, jnp.asarray(tilt))
     height = None if ground is None else ground.height

@@ -68,9 +68,9 @@ QUICK, CAREFUL, FINE = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1), (THICK,
 """Cores on the way: on the first one, where that is lost, and with the highest harmonics damped."""
 
 DAMPED = 0.3
-"""Damping of the highest harmonic over the azimuth (`azimuth_damping`) for a wake that is not found without: beside the
-disk in slow flight vortices lie within each other's cores, and what neighbouring azimuths' do there to each other,
-twelve of them do not resolve; nothing else damps it, and the branch folds again and again.
+"""Damping of the highest harmonics over the azimuth (`azimuth_damping`) for a wake that is not found without: beside
+the disk in slow flight vortices lie within each other's cores and wind round each other, twelve azimuths have one or
+two nodes for that, and nothing else damps it.
 """
 
 WASHOUT, FAR = 0.08, 4.0

@@ -27,7 +27,7 @@ def test_what_is_spoiled_was_right(tmp_path):
     """A file that is refused as it stands would hide what spoiling it does."""
     for text, read in ((DECK, read_deck), (FLIGHT, read_flight), (CALIBRATION, load_calibration)):
         (tmp_path / "file.toml").write_text(text)
-        read(tmp_path / "file.toml")
+        assert read(tmp_path / "file.toml") is not None
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))

@@ -210,6 +210,8 @@ def test_damping_the_highest_harmonics_is_told_and_changes_little(cruise):
     assert str(verdict(cruise.trimmed)).startswith("converged: ")
     assert not np.allclose(found.z.wake.far, cruise.trimmed.z.wake.far, atol=1e-5)
     np.testing.assert_allclose(means(found).CQ, cruise.means.CQ, rtol=0.01)
+    with pytest.warns(UserWarning, match=r"azimuth_damping = 0\.3\); a march and a linear model have no such damping"):
+        from_wake(found)
 
 
 @pytest.mark.slow
