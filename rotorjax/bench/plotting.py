@@ -17,7 +17,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rotorjax.bench.azimuth import refine_azimuth
+from rotorjax.bench.curves import KEYWORD, curves
 from rotorjax.io.atomic import write_bytes
+from rotorjax.io.png_text import with_text
 
 FREE_WAKE, VPBFSM, PRINTED, EXACT_IMAGE, INK = "#0072B2", "#D55E00", "#E69F00", "#009E73", "#222222"
 MODEL_STYLE: dict[str, dict[str, Any]] = {
@@ -77,12 +79,13 @@ def save_file(figure: Figure, path: str | Path) -> None:
 
 
 def drawn(figure: Figure, ending: str = "png") -> bytes:
-    """A picture as the content of a file of a format."""
+    """A picture as the content of a file of a format; a PNG knows the numbers of its curves."""
     metadata = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending, {})
     file = io.BytesIO()
     with style():
         figure.savefig(file, format=ending, metadata=metadata)
-    return file.getvalue()
+    found = file.getvalue()
+    return with_text(found, KEYWORD, curves(figure)) if ending == "png" else found
 
 
 def series_colours(count: int) -> list[Any]:

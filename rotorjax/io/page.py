@@ -1,4 +1,6 @@
-"""Markdown reports as one HTML page that opens offline: pictures inside, tables that sort by a click on their head."""
+"""Markdown reports as one HTML page that opens offline: pictures inside whose curves tell their values to the mouse,
+tables that sort by a click on their head, settings folded away.
+"""
 
 import base64
 import html
@@ -9,6 +11,7 @@ from pathlib import Path
 from rotorjax.io.atomic import write_text
 
 TEMPLATE = Path(__file__).with_name("page.html")
+FOLDED = re.compile(r'(<h2 id="(?:settings|asked-for|time)">.*?</h2>)(.*?)(?=<h2|\Z)', re.DOTALL)  # what few look up
 KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif"}
 
 
@@ -16,7 +19,8 @@ def write_page(path: str | Path, text: str, pictures: Mapping[str, bytes] | None
     """Write Markdown as a page. Pictures are taken from `pictures`, by name, else from the page's folder; one that is
     not there stays a link.
 
-    The title is the first heading. Raises InputError where the file cannot be written.
+    The title is the first heading; sections on settings and times are folded; the mouse reads values off the curves of
+    pictures that carry them (bench/curves.py). Raises InputError where the file cannot be written.
     """
     from markdown import Markdown
 
@@ -24,6 +28,7 @@ def write_page(path: str | Path, text: str, pictures: Mapping[str, bytes] | None
     maker = Markdown(extensions=["tables", "toc", "sane_lists"], extension_configs={"toc": {"toc_depth": "2-2"}})
     given = pictures or {}
     body = re.sub(r'<img ([^>]*?)src="([^"]+)"', lambda m: _embedded(m, path.parent, given), maker.convert(text))
+    body = FOLDED.sub(r"<details><summary>\1</summary>\2</details>", body)
     body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
     heading = re.search(r"^# (.+)$", text, re.MULTILINE)
     page = TEMPLATE.read_text(encoding="utf-8")
