@@ -31,6 +31,7 @@ import numpy as np
 from tqdm import tqdm
 
 from rotorjax.ground import plane
+from rotorjax.io.atomic import json_text
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import solidity, twist
 from rotorjax.sweep.pools import Here, Job, Pool, Processes, as_seen_by_workers
@@ -151,7 +152,7 @@ def row_of(part: str, i: int, seed: int, quick: bool, progress: Any = None) -> d
     try:
         found = solved(case, quick)
     except Exception as problem:  # one case must not end the others
-        nothing = dict.fromkeys(("residual", "load_change", "CT"), float("nan"))
+        nothing = dict.fromkeys(("residual", "load_change", "CT"))
         found = {"converged": False, "verdict_text": repr(problem), "iterations": 0} | nothing
     wall, compiling = clock.read()
     row = {"part": part, "case": i, **case, **found, "solve_s": wall - compiling, "compile_s": compiling}
@@ -188,7 +189,7 @@ def keep(rows: list[dict[str, Any]], chosen: argparse.Namespace) -> None:
     """Write what there is, all or nothing."""
     file = Path(chosen.json)
     written = file.with_name(f"{file.name}.new")
-    written.write_text(json.dumps({"seed": chosen.seed, "quick": chosen.quick, "rows": rows}, indent=1))
+    written.write_text(json_text({"seed": chosen.seed, "quick": chosen.quick, "rows": rows}, indent=1))
     written.replace(file)
 
 
@@ -204,7 +205,8 @@ def line(row: dict[str, Any]) -> str:
         f"{row['solve_s']:.1f} s and {row['compile_s']:.1f} s compiling ({row['busy_s']:.1f} s of the processor), "
         f"{row['iterations']} iterations"
     )
-    return f"{row['part']} {row['case']}: {row['rotor']}, {where}: residual {row['residual']:.1e}, {took}, {end}"
+    residual = "none" if row["residual"] is None else f"{row['residual']:.1e}"
+    return f"{row['part']} {row['case']}: {row['rotor']}, {where}: residual {residual}, {took}, {end}"
 
 
 def summary(part: str, rows: list[dict[str, Any]]) -> str:

@@ -8,7 +8,6 @@ N points against N segments, given as eight filaments; seconds exclude compilati
 
 import argparse
 import ctypes
-import json
 import os
 import shutil
 import subprocess
@@ -23,6 +22,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from rotorjax.io.atomic import json_text
 from rotorjax.wake.biot_savart import filament_velocity, segment_velocity
 
 C_SOURCE = r"""
@@ -330,8 +330,8 @@ def main():
         "grad_peak_memory_mb_at_20000": peak_memory_mb(20000),
         "max_rel_error_f64": max_relative_error(),
     }
-    options.json.write_text(json.dumps(figures, indent=2) + "\n")
-    print(json.dumps(figures, indent=2))
+    options.json.write_text(json_text(figures, indent=2) + "\n")
+    print(json_text(figures, indent=2))
     return None
 
 

@@ -8,7 +8,6 @@ rotor in the upper one's far wake (Leishman & Syal 2008, doi:10.4050/JAHS.53.11)
 """
 
 import argparse
-import json
 from pathlib import Path
 
 import equinox as eqx
@@ -18,6 +17,7 @@ import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import new_figure, save_file, style
+from rotorjax.io.atomic import json_text
 from rotorjax.wake.several_solution import performance_of
 
 jax.config.update("jax_enable_x64", True)
@@ -63,7 +63,7 @@ def polar(settings) -> list[dict]:
             "torque_gap": gap,
             "converged": bool(single.converged and pair.converged),
         }
-        print(json.dumps(row), flush=True)
+        print(json_text(row), flush=True)
         rows.append(row)
     return rows
 
@@ -81,7 +81,7 @@ def interference(settings, thrust=0.004):
         found = rj.solve(model, found)
         ratio = (found.CP_induced / alone).tolist()
         row = {"distance": distance, "upper": ratio[0], "lower": ratio[1], "pair": float(np.mean(ratio))}
-        print(json.dumps(row | {"converged": found.converged, "why": found.why}), flush=True)
+        print(json_text(row | {"converged": found.converged, "why": found.why}), flush=True)
         rows.append(row)
     return rows
 
@@ -103,7 +103,7 @@ def derivative(settings, thrust=0.004, step=1e-5) -> None:
 
     forward, reverse = jax.jvp(jax.jit(power), (0.0,), (1.0,))[1], jax.grad(jax.jit(power))(0.0)
     difference = (pair(thrust + step, here).CP.sum() - pair(thrust - step, here).CP.sum()) / (2 * step)
-    print(json.dumps({"forward": float(forward), "reverse": float(reverse), "difference": float(difference)}))
+    print(json_text({"forward": float(forward), "reverse": float(reverse), "difference": float(difference)}))
 
 
 def main() -> None:
@@ -120,7 +120,7 @@ def main() -> None:
     if chosen.out is None:
         return
     chosen.out.mkdir(parents=True, exist_ok=True)
-    (chosen.out / "coaxial.json").write_text(json.dumps({"polar": rows, "interference": near}, indent=1))
+    (chosen.out / "coaxial.json").write_text(json_text({"polar": rows, "interference": near}, indent=1))
     with style():
         figure = new_figure(6, 4)
         axes = figure.add_subplot()

@@ -7,7 +7,6 @@ whatever changes from one revolution to the next is the march leaving the period
 """
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from rotorjax.coupled import blades_at, rhs
 from rotorjax.coupled_wake import model_of
+from rotorjax.io.atomic import json_text
 from rotorjax.simulation.case import COLUMNS, SimulationCase
 from rotorjax.simulation.history import read_history
 from rotorjax.simulation.run import SAVES, fly_from
@@ -93,7 +93,7 @@ def main():
             value = " ".join(f"{v:.3g}" if name != "CT_by_revolution" else f"{v:.6f}" for v in value)
         print(f"{name:28s} {value if isinstance(value, (str, bool, int)) else format(value, '.4g')}")
     if chosen.json:
-        chosen.json.write_text(json.dumps(figures, indent=1))
+        chosen.json.write_text(json_text(figures, indent=1))
 
 
 if __name__ == "__main__":

@@ -8,12 +8,13 @@ without the door (tests and notebooks of that time).
 """
 
 import argparse
-import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
+
+from rotorjax.io.atomic import json_text
 
 START = "import jax\njax.config.update('jax_enable_x64', True)\nimport jax.numpy as jnp\n"
 TASKS = {
@@ -84,7 +85,7 @@ def main() -> None:
         )
     if chosen.json:
         with open(chosen.json, "w", encoding="utf-8") as file:
-            json.dump(rows, file, indent=1)
+            file.write(json_text(rows, indent=1))
 
 
 if __name__ == "__main__":

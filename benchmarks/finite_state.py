@@ -1,7 +1,6 @@
 """Time the finite-state model: `python benchmarks/finite_state.py [--json FILE]`. Medians; compilation apart."""
 
 import argparse
-import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ from rotorjax.deck.march import simulate
 from rotorjax.deck.over_ground import OverGround, controls, over_ground, trim
 from rotorjax.deck.tip_path import tip_path
 from rotorjax.ground import Plane, plane
+from rotorjax.io.atomic import json_text
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import ground_table
 from rotorjax.potential.model import FiniteStateModel, finite_state_model, inflow, mean_inflow, steady_state
@@ -147,7 +147,7 @@ def main() -> None:
             + (f"   step {result['step_us']:8.1f} µs" if "step_us" in result else "")
         )
     if options.json:
-        options.json.write_text(json.dumps(results, indent=2) + "\n")
+        options.json.write_text(json_text(results, indent=2) + "\n")
 
 
 if __name__ == "__main__":

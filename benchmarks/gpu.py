@@ -19,7 +19,6 @@ Programs of a part are compiled side by side, and only then timed; a part that f
 """
 
 import argparse
-import json
 import os
 import pickle
 import time
@@ -41,6 +40,7 @@ from scipy.interpolate import interp1d
 
 from rotorjax.coupled import rate_and_output
 from rotorjax.ground import plane
+from rotorjax.io.atomic import json_text
 from rotorjax.potential.model import finite_state_model, steady_state
 from rotorjax.simulation.march import March, MarchState, cast, compiled, march, marching, on_device, precision_of
 from rotorjax.simulation.start import Start, start_of
@@ -330,7 +330,7 @@ def main() -> None:
             shown = value if isinstance(value, str) else f"{value:.4g}"
             print(f"{time.perf_counter() - begun:6.1f} s  {key:52s} {shown}", flush=True)
             if chosen.json:
-                chosen.json.write_text(json.dumps(figures, indent=1) + "\n")
+                chosen.json.write_text(json_text(figures, indent=1) + "\n")
 
 
 def chain(found: Figures, part: str) -> Figures:

@@ -17,7 +17,6 @@ Prints, for each inflow and flight:
 """
 
 import argparse
-import json
 import resource
 import time
 from dataclasses import replace
@@ -26,6 +25,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
+from rotorjax.io.atomic import json_text
 from rotorjax.linearisation import flight, identified, rotor, steps, wake_flight
 from rotorjax.linearisation.compact import compact, frequencies
 from rotorjax.linearisation.condensed import aligned
@@ -222,11 +222,11 @@ def main():
                 print("  derivatives:", ", ".join(f"{k} {v:.0e}" for k, v in found[name].items()), flush=True)
     if chosen.wake:
         rows.append(wake_row(chosen.order))
-        print(json.dumps(rows[-1], indent=1, ensure_ascii=False))
+        print(json_text(rows[-1], indent=1))
     table = table_rows((0.1, 0.2), (None, 1.0), (0.15, None)) if chosen.table else {}
     if chosen.json:
         with open(chosen.json, "w") as file:
-            json.dump({"flights": rows, "derivatives": found, "identified": table}, file, indent=1)
+            file.write(json_text({"flights": rows, "derivatives": found, "identified": table}, indent=1))
 
 
 if __name__ == "__main__":

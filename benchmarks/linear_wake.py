@@ -11,7 +11,6 @@ Prints two tables for the UH-60 over level ground at the study's resolution, aft
 """
 
 import argparse
-import json
 import resource
 import time
 
@@ -21,6 +20,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.ground import plane
+from rotorjax.io.atomic import json_text
 from rotorjax.linearisation.assembly import assemble
 from rotorjax.linearisation.outputs import outputs
 from rotorjax.linearisation.system import orbit_of
@@ -169,7 +169,7 @@ def main():
     )
     if chosen.json:
         with open(chosen.json, "w") as file:
-            json.dump(found, file, indent=1)
+            file.write(json_text(found, indent=1))
 
 
 if __name__ == "__main__":

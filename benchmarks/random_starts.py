@@ -8,7 +8,6 @@ UH-60 in hover and over level ground. Two wakes are the same where their nodes l
 """
 
 import argparse
-import json
 import sys
 import time
 
@@ -18,6 +17,7 @@ import numpy as np
 from tqdm import tqdm
 
 from rotorjax.ground import plane
+from rotorjax.io.atomic import json_text
 from rotorjax.rotor.catalogue import load
 from rotorjax.wake.equilibrium import Unknowns, displacement, evaluated
 from rotorjax.wake.model import FreeWake, free_wake
@@ -108,7 +108,7 @@ def main() -> None:
         print(table(found[-1]), flush=True)
         if chosen.json:
             with open(chosen.json, "w") as file:
-                json.dump(found, file, indent=1)
+                file.write(json_text(found, indent=1))
 
 
 if __name__ == "__main__":

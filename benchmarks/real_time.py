@@ -14,7 +14,6 @@ filter and the steps that it needs. Compilation is not counted but in compile_s.
 """
 
 import argparse
-import json
 import resource
 import tempfile
 import time
@@ -29,6 +28,7 @@ import numpy as np
 
 from rotorjax.coupled import inflow_velocity, rate_and_output
 from rotorjax.coupled_wake import CoupledWake
+from rotorjax.io.atomic import json_text
 from rotorjax.simulation.case import COLUMNS, SimulationCase
 from rotorjax.simulation.march import cast, compiled, march, marching, on_device, precision_of
 from rotorjax.simulation.pace import Pace
@@ -219,7 +219,7 @@ def main():
     if chosen.accuracy:
         figures["step_error"] = max(v for k, v in figures.items() if k.startswith("step_error"))
     if chosen.json:
-        chosen.json.write_text(json.dumps(figures, indent=1) + "\n")
+        chosen.json.write_text(json_text(figures, indent=1) + "\n")
 
 
 if __name__ == "__main__":

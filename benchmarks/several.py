@@ -9,7 +9,6 @@ For cold times: `JAX_COMPILATION_CACHE_DIR=$(mktemp -d) python benchmarks/severa
 """
 
 import argparse
-import json
 import time
 from pathlib import Path
 
@@ -19,6 +18,7 @@ import numpy as np
 
 import rotorjax as rj
 from rotorjax.bench.plotting import legend_below, new_figure, save_file, style
+from rotorjax.io.atomic import json_text
 
 jax.config.update("jax_enable_x64", True)
 BEGAN = time.perf_counter()
@@ -56,7 +56,7 @@ def quadrotor(settings, out: Path | None) -> dict:
     up = along(solved, np.stack([0 * z, 0 * z, z], axis=1))[:, 2]
     row |= {"most_upflow": float(up.max()), "at_z": float(z[up.argmax()])}
     row["over_hover_inflow"] = row["most_upflow"] / float(np.sqrt(solved.CT.mean() / 2))
-    print(json.dumps({"quadrotor": row}), flush=True)
+    print(json_text({"quadrotor": row}), flush=True)
     if out is not None:
         draw_fountain(solved, out / "quadrotor.png")
     return row
@@ -97,7 +97,7 @@ def heights(settings, out: Path | None) -> dict:
             last[name] = found
             row = {"height": height, "ratio": float(np.mean(found.CT) / alone.CT), "converged": bool(found.converged)}
             row |= {"why": found.why, "inflow": float(np.mean(found.mean_inflow))}
-            print(json.dumps({name: row}), flush=True)
+            print(json_text({name: row}), flush=True)
             rows[name].append(row)
     if out is not None:
         draw_heights(rows, out / "over_ground.png")
@@ -126,7 +126,7 @@ def edge(settings, out: Path | None) -> dict:
     row = {"seconds": time.perf_counter() - began, "converged": solved.converged, "why": solved.why}
     row |= {"panels": len(deck), "residual": solved.found.residual, "CT": solved.CT.tolist()}
     row |= {"inflow": solved.mean_inflow.tolist()}
-    print(json.dumps({"edge": row}), flush=True)
+    print(json_text({"edge": row}), flush=True)
     if out is not None:
         solved.plot(out / "deck_edge.png")
     return row
@@ -147,7 +147,7 @@ def main() -> None:
     settings = None if chosen.default else rj.hover_settings(**SETTINGS)
     found = {part: PARTS[part](settings, chosen.out) for part in chosen.parts}
     if chosen.json is not None:
-        chosen.json.write_text(json.dumps(found, indent=1))
+        chosen.json.write_text(json_text(found, indent=1))
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 
 from rotorjax.frames import rotate_about_shaft
+from rotorjax.io.atomic import json_text
 
 
 def plain_velocity(points, start, end, strength, core, *, plane=None, blades=1):
@@ -84,7 +85,7 @@ def main():
     for name, value in figures.items():
         print(f"{name:36s} {value:.4g}")
     if chosen.json:
-        chosen.json.write_text(json.dumps(figures, indent=1))
+        chosen.json.write_text(json_text(figures, indent=1))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,6 @@ keeps all of it to minutes: three free turns, 8 azimuths, cores of 0.05 R (`SETT
 """
 
 import argparse
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +21,7 @@ import numpy as np
 import rotorjax as rj
 from rotorjax.bench.plotting import FREE_WAKE, VPBFSM, legend_below, new_figure, save_file, style
 from rotorjax.frames import disk_points, rotate_about_shaft
+from rotorjax.io.atomic import json_text
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, normal_flow, solid
 from rotorjax.wake.biot_savart import segment_velocity
@@ -89,7 +89,7 @@ def limits(quick: bool) -> dict:
     for name, flow in (("ring", of_ring), ("wake", of_wake)):
         for panel in (0.25, 0.125) if quick else (0.3, 0.2, 0.1):
             rows.append({"of": name, "panel": panel} | against_image(jax.jit(flow), panel))
-            print(json.dumps({"flat patch against image": rows[-1]}), flush=True)
+            print(json_text({"flat patch against image": rows[-1]}), flush=True)
     return {"patch": rows}
 
 
@@ -125,7 +125,7 @@ def derivative(quick: bool) -> dict:
         return wake(wall.moved((farther, 0.0, 0.0)), quick=quick)
 
     here = rj.solve(beside(0.0), tol=1e-10)
-    print(json.dumps({"beside": float(here.CT), "why": here.why, "left_through_panels": no_flow(here)}), flush=True)
+    print(json_text({"beside": float(here.CT), "why": here.why, "left_through_panels": no_flow(here)}), flush=True)
     step = 1e-4
     there = [float(rj.solve(beside(s), here, tol=1e-10).CT) for s in (step, -step)]
     row = {"differences": (there[0] - there[1]) / (2 * step)}
@@ -141,9 +141,9 @@ def derivative(quick: bool) -> dict:
 
     row["frozen_forward"] = float(jax.jvp(frozen, (0.0,), (1.0,))[1])
     row["frozen_differences"] = float(frozen(1e-4) - frozen(-1e-4)) / 2e-4
-    print(json.dumps({"derivative": row}), flush=True)
+    print(json_text({"derivative": row}), flush=True)
     row["implicit_forward"] = float(jax.jvp(thrust, (0.0,), (1.0,))[1])
-    print(json.dumps({"derivative": row}), flush=True)
+    print(json_text({"derivative": row}), flush=True)
     return row
 
 
@@ -168,11 +168,11 @@ def cost(quick: bool) -> dict:
             rows.append(
                 {"panels": len(corners), "targets": targets, "seconds": min(spent), "ns": min(spent) / pairs * 1e9}
             )
-            print(json.dumps({"cost": rows[-1]}), flush=True)
+            print(json_text({"cost": rows[-1]}), flush=True)
     began = time.perf_counter()
     body = rj.box((-2, -2, -1), (2, 2, 1), 0.25 if quick else 0.14)
     solid(body).inverse.block_until_ready()
-    print(json.dumps({"matrix and inverse, cold": time.perf_counter() - began, "panels": len(body)}), flush=True)
+    print(json_text({"matrix and inverse, cold": time.perf_counter() - began, "panels": len(body)}), flush=True)
     return {"pairs": rows}
 
 
@@ -210,7 +210,7 @@ def told(name: str, place: dict, solved: dict, panels: int = 0) -> dict:
     if "wake" in solved:
         row |= {"iterations": solved["wake"].found.iterations, "seconds": solved["wake"].found.wall_time_s}
         row |= {"left": no_flow(solved["wake"]), "panels": panels} if panels else {}
-    print(json.dumps({name: row}), flush=True)
+    print(json_text({name: row}), flush=True)
     return row
 
 
@@ -350,7 +350,7 @@ def wind(quick: bool) -> list[dict]:
         row = {"of": name, "converged": found.converged, "why": found.trimmed.outcome.why, "CT": float(found.means.CT)}
         row |= {"controls_deg": np.rad2deg(found.trimmed.z.controls).tolist()}
         row |= {"seconds": time.perf_counter() - began, "processor": time.process_time() - busy}
-        print(json.dumps({"wind": row}), flush=True)
+        print(json_text({"wind": row}), flush=True)
         rows.append(row)
     return rows
 
@@ -372,7 +372,7 @@ def passing(quick: bool) -> dict:
             found.append((x, float(state.y.CT), float(state.y.moment[0]), float(state.y.moment[1])))
         rows[name] = found
         spent = {"seconds": time.perf_counter() - began, "processor": time.process_time() - busy, "steps": len(found)}
-        print(json.dumps({"passing": name, "mean_CT": float(np.mean([row[1] for row in found])), **spent}), flush=True)
+        print(json_text({"passing": name, "mean_CT": float(np.mean([row[1] for row in found])), **spent}), flush=True)
     return rows
 
 
@@ -415,7 +415,7 @@ def main() -> None:
         if part == "hangar":
             found[part], pictured = found[part]
         if chosen.json is not None:
-            chosen.json.write_text(json.dumps(found, indent=1))
+            chosen.json.write_text(json_text(found, indent=1))
         if chosen.out is not None:
             draw(part, found[part], pictured, chosen.out)
 

@@ -8,7 +8,6 @@ killed so many times by SIGKILL, at random moments, and its table is compared wi
 """
 
 import argparse
-import json
 import random
 import signal
 import subprocess
@@ -19,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+
+from rotorjax.io.atomic import json_text
 
 CASES = {
     "hover": '[case]\ncommand = "inflow"\ncollective_deg = 16.0\n[axes]\n'
@@ -125,7 +126,7 @@ def main() -> None:
             found["largest_difference_after_kills"] = largest_difference(table, again)
     print("\n".join(f"{name:32s} {value}" for name, value in found.items()))
     if chosen.json:
-        chosen.json.write_text(json.dumps(found, indent=1))
+        chosen.json.write_text(json_text(found, indent=1))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ tracing counts as solving. A trim in a model's inflow starts from the one before
 """
 
 import argparse
-import json
 import sys
 import time
 from dataclasses import replace
@@ -15,6 +14,7 @@ from dataclasses import replace
 import jax
 from tqdm import tqdm
 
+from rotorjax.io.atomic import json_text
 from rotorjax.reference.published import hayden
 from rotorjax.rotor.catalogue import load
 from rotorjax.rotor.geometry import solidity
@@ -136,7 +136,7 @@ def main() -> None:
             bar.update()
             if chosen.json:
                 with open(chosen.json, "w") as file:
-                    json.dump(list(trims.rows.values()), file, indent=1)
+                    file.write(json_text(list(trims.rows.values()), indent=1))
 
         for name in chosen.parts:
             print("\n" + parts[name](trims, chosen.inflows, show), flush=True)

@@ -38,8 +38,13 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_json(path: str | Path, content: Any) -> None:
-    """Write strict JSON: numbers that are not finite become null. Raises InputError where it cannot be written."""
-    write_text(path, json.dumps(_plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    """Write strict JSON as `json_text` has it. Raises InputError where it cannot be written."""
+    write_text(path, json_text(content, indent=2) + "\n")
+
+
+def json_text(content: Any, indent: int | None = None) -> str:
+    """Strict JSON: numbers that are not finite become null, arrays lists."""
+    return json.dumps(_plain(content), indent=indent, ensure_ascii=False, allow_nan=False)
 
 
 def make_folder(path: str | Path) -> Path:

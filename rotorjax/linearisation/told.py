@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rotorjax.bench.plotting import INK, new_figure, series_colours, style
@@ -66,7 +67,9 @@ def mode_content(mode: Mode) -> dict[str, Any]:
 
 
 def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio") -> Figure:
-    """Exponents in the plane; of several flights each mode is a line from the first (open) to the last."""
+    """Exponents in the plane, each with its name; of several flights each mode is a line from the first (open) to the
+    last, and the names stand beside.
+    """
     paths: dict[str, list[complex]] = {}
     for modes in by_value.values():
         for mode in modes:
@@ -80,5 +83,19 @@ def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio")
             axes.plot(np.real(values[0]), np.imag(values[0]), "o", color=colour, mfc="white")
         span = ", ".join(f"{value:g}" for value in by_value)
         axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=f"{label} {span}")
-        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        if len(by_value) == 1:
+            _name(axes, {name: values[0] for name, values in paths.items()})
+        else:
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
+
+
+def _name(axes: Axes, modes: dict[str, complex]) -> None:
+    """Names beside their exponents; upright where several lie on the axis of no frequency."""
+    for name, value in modes.items():
+        real = abs(value.imag) < 0.02
+        look: dict[str, Any] = (
+            {"rotation": 60, "va": "bottom", "ha": "left"} if real else {"va": "center", "ha": "right"}
+        )
+        place = (0, 5) if real else (-7, 0)
+        axes.annotate(name, (value.real, value.imag), place, textcoords="offset points", fontsize=9, **look)

@@ -62,7 +62,17 @@ def summary(found: Found) -> dict[str, Any]:
 def report(found: Found) -> str:
     """The report in Markdown."""
     times = ", ".join(f"{stage} {seconds:.1f} s" for stage, seconds in found.seconds.items())
-    return f"# Linear model: {title_of(found)}\n\n{_teller(found).report(found)}\n\n## Time\n\n{times}\n"
+    parts = (f"# Linear model: {title_of(found)}", _answer(found), _teller(found).report(found), "## Time", times)
+    return "\n\n".join(parts) + "\n"
+
+
+def _answer(found: Found) -> str:
+    """What is asked first: whether it is damped, how good it is, how it is loaded."""
+    worst = max(found.modes, key=lambda mode: mode.exponent.real)
+    rate = f"{worst.name}, growth {worst.exponent.real:.3g} per radian at {abs(worst.exponent.imag):.3g}/rev"
+    damped = f"All modes are damped, the least: {rate}." if worst.exponent.real < 0 else f"It grows, fastest: {rate}."
+    loaded = f"README.md beside this page says how {', '.join(f'{name}.mat' for name in found.models)} are loaded."
+    return "\n".join(f"- {line}" for line in (damped, *_teller(found).lines(found), loaded))
 
 
 def lines(found: Found) -> str:

@@ -19,6 +19,8 @@ def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure
     rows = [row for row in rows if row["converged"]]
     over_height = len({row["height"] for row in rows}) > 1
     x = np.array([row["height"] if over_height else row["advance_ratio"] for row in rows], float)
+    tip = float(found[0].request.operating.tip_speed(found[0].request.rotor.radius))
+    speed = (lambda ratio: ratio * tip), (lambda metres: metres / tip)
     with plotting.style():
         figure = plotting.new_figure(9.0, 4.3)
         power, controls = figure.subplots(1, 2)
@@ -37,6 +39,8 @@ def draw(found: Sequence[Result], out_of_ground: Result | None = None) -> Figure
         for axes in (power, controls):
             axes.set_xlabel("height over $R$" if over_height else "advance ratio")
             plotting.legend_below(axes, 2)
+            if not over_height:
+                axes.secondary_xaxis("top", functions=speed).set_xlabel("speed, m/s")
         power.set_title(rf"{rows[0]['rotor']}, {rows[0]['inflow']}, $C_T$ = {rows[0]['CT']:.5f}")
     return figure
 

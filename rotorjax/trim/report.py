@@ -13,6 +13,7 @@ from rotorjax.trim.run import Result, numbers
 NOTHING = 1e-9
 _COLUMNS = {
     "advance_ratio": "advance ratio",
+    "speed_m_s": "speed, m/s",
     "height": "height, R",
     "collective_deg": "θ₀, deg",
     "theta_1c_deg": "θ₁c, deg",
@@ -29,6 +30,7 @@ _COLUMNS = {
     "figure_of_merit": "figure of merit",
     "verdict": "verdict",
 }
+_CONTROLS = {"collective_deg": "Collective", "theta_1s_deg": "Longitudinal cyclic θ₁s", "tilt_deg": "Shaft forward"}
 
 
 def write_report(path: str | Path, found: Sequence[Result], out_of_ground: Result | None = None) -> None:
@@ -60,7 +62,7 @@ def markdown(rows: Sequence[dict[str, Any]], first: Result, pictures: Sequence[s
         _answer(rows, good),
         *(f"![Power and controls]({name})" for name in pictures),
         "## Points\n\n" + table([_COLUMNS[key] for key in shown], cells),
-        *(f"{row['inflow']} at {_place(row)}: {row['verdict_text']}" for row in rows),
+        *(f"{_place(row)}: {row['verdict_text']}." for row in rows if row["verdict"] != "converged"),
         "## Asked for\n\n" + table(("what", "value"), asked.items()),
         "Angles in degrees, as at the blade's root and in the hub's multi-blade coordinates; C_T = T/(ρA(ΩR)²), C_P = "
         "P/(ρA(ΩR)³).",
@@ -79,12 +81,21 @@ def _answer(rows: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]]) -> s
     if not good:
         return f"None of {len(rows)} points converged: {rows[0]['verdict_text']}."
     least = min(good, key=lambda row: row["CP"])
-    told = f"C_P = {least['CP']:.4e} ({least['power_kW']:.0f} kW)"
+    told = f"{least['power_kW']:.0f} kW (C_P = {least['CP']:.4e}) at {_place(least)}"
     if len(rows) == 1:
-        return f"{told} with a collective of {least['collective_deg']:.2f}° at {_place(least)}."
-    return f"{len(good)} of {len(rows)} points converged. Least power: {told} at {_place(least)}."
+        return f"{told}, with a collective of {least['collective_deg']:.2f}°: {least['verdict_text']}."
+    found = [f"{len(good)} of {len(rows)} points converged.", f"Least power: {told}."]
+    for key, name in (
+        ("collective_deg", "Collective"),
+        ("theta_1s_deg", "Longitudinal cyclic θ₁s"),
+        ("tilt_deg", "Shaft"),
+    ):
+        low, high = (of(row[key] for row in good) for of in (min, max))
+        if high - low > 0.005:  # what two digits show
+            found.append(f"{name} from {low:.2f}° to {high:.2f}°.")
+    return "\n".join(f"- {line}" for line in found)
 
 
 def _place(row: dict[str, Any]) -> str:
     ground = "out of ground effect" if row["height"] is None else f"h = {row['height']:g} R"
-    return f"advance ratio {row['advance_ratio']:g}, {ground}"
+    return f"advance ratio {row['advance_ratio']:.4g} ({row['speed_m_s']:.4g} m/s), {ground}"

@@ -207,6 +207,7 @@ def numbers(result: Result) -> dict[str, Any]:
         "node_movement": result.verdict.node_movement,
         "iterations": result.trimmed.iterations,
         "advance_ratio": request.advance,
+        "speed_m_s": request.advance * tip,
         "height": request.height,
         "slope_deg": request.slope_deg,
         **{f"{name}_deg": float(value) for name, value in zip(names, angles, strict=True)},
@@ -237,7 +238,7 @@ def table(found: dict[str, Any]) -> str:
     place = "out of ground effect" if found["height"] is None else f"h = {found['height']:g} R"
     rows = (
         "{rotor}, {inflow}: {thrust_newton:.0f} N, C_T = {CT:.6f} (C_T/σ = {CT_over_solidity:.4f}), advance ratio "
-        "{advance_ratio:g}, " + place,
+        "{advance_ratio:.4g} ({speed_m_s:.4g} m/s), " + place,
         "controls  θ₀ {collective_deg:.3f}°, θ₁c {theta_1c_deg:.3f}°, θ₁s {theta_1s_deg:.3f}°, "
         "shaft {tilt_deg:.3f}° forward",
         "blades    β₀ {beta_0_deg:.3f}°, β₁c {beta_1c_deg:.3f}°, β₁s {beta_1s_deg:.3f}°, lag {lag_0_deg:.3f}°",

@@ -165,7 +165,7 @@ def test_a_curve_over_speed(tmp_path, cruise, told):
     told = page.read_text()
     assert told.count("data:image/png") == 1
     assert "3 of 3 points converged" in told
-    assert f"({points[2]['power_watt'] / 1e3:.0f} kW) at advance ratio 0.2" in told
+    assert f"{points[2]['power_watt'] / 1e3:.0f} kW (C_P = {points[2]['CP']:.4e}) at advance ratio 0.2" in told
 
 
 @pytest.mark.parametrize(
