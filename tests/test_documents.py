@@ -153,7 +153,7 @@ def test_the_gallery_is_whole():
     folder = ROOT / "docs" / "gallery"
     scripts = [path for path in folder.glob("*.py") if path.name != "run.py"]
     page = (folder / "index.md").read_text()
-    assert 12 <= len(scripts) <= 20
+    assert len(scripts) == 20
     assert {path.stem for path in scripts} == {path.stem for path in folder.glob("*.webp")}
     for script in scripts:
         assert len(lines_of(script)) <= 10, script

@@ -15,6 +15,8 @@ from rotorjax.trim.run import FREE_WAKE
 
 MOST_TOLD = 4
 """States of a mode that are told in a table."""
+ALIKE = 0.06
+"""Of exponents that share a place in the picture of roots, per radian."""
 
 
 def title_of(found: LinearRotor) -> str:
@@ -67,35 +69,31 @@ def mode_content(mode: Mode) -> dict[str, Any]:
 
 
 def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio") -> Figure:
-    """Exponents in the plane, each with its name; of several flights each mode is a line from the first (open) to the
-    last, and the names stand beside.
-    """
-    paths: dict[str, list[complex]] = {}
-    for modes in by_value.values():
-        for mode in modes:
-            paths.setdefault(mode.name, []).append(mode.exponent)
+    """Exponents in the plane, one colour a flight; the modes of the one in the middle have their names beside them."""
     with style():
         figure = new_figure(8.5, 5.0)
         axes = figure.subplots()
         axes.axvline(0, color=INK, lw=0.8)
-        for (name, values), colour in zip(paths.items(), series_colours(len(paths)), strict=True):
-            axes.plot(np.real(values), np.imag(values), "-", color=colour, lw=1, marker="o", label=name)
-            axes.plot(np.real(values[0]), np.imag(values[0]), "o", color=colour, mfc="white")
-        span = ", ".join(f"{value:g}" for value in by_value)
-        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=f"{label} {span}")
-        if len(by_value) == 1:
-            _name(axes, {name: values[0] for name, values in paths.items()})
-        else:
-            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+        for (value, modes), colour in zip(by_value.items(), series_colours(len(by_value)), strict=True):
+            exponents = np.array([mode.exponent for mode in modes])
+            axes.plot(exponents.real, exponents.imag, "o", color=colour, ms=4.5, label=f"{label} {value:g}")
+        _name(axes, list(by_value.values())[len(by_value) // 2])
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev")
+        axes.legend(loc="upper left")
     return figure
 
 
-def _name(axes: Axes, modes: dict[str, complex]) -> None:
-    """Names beside their exponents; upright where several lie on the axis of no frequency."""
-    for name, value in modes.items():
-        real = abs(value.imag) < 0.02
-        look: dict[str, Any] = (
-            {"rotation": 60, "va": "bottom", "ha": "left"} if real else {"va": "center", "ha": "right"}
-        )
-        place = (0, 5) if real else (-7, 0)
-        axes.annotate(name, (value.real, value.imag), place, textcoords="offset points", fontsize=9, **look)
+def _name(axes: Axes, modes: Sequence[Mode]) -> None:
+    """Names beside exponents, one under the other where several share a place; slanted at frequencies near zero."""
+    places: dict[tuple[float, float], list[Mode]] = {}
+    for mode in modes:
+        places.setdefault((round(mode.exponent.real / ALIKE), round(mode.exponent.imag / ALIKE)), []).append(mode)
+    for alike in places.values():
+        at = alike[0].exponent
+        look: dict[str, Any] = {"xytext": (-7, 0), "va": "center", "ha": "right"}
+        if at.real > max(mode.exponent.real for mode in modes) - ALIKE:  # the least damped, towards the free side
+            look = {"xytext": (7, 0), "va": "center", "ha": "left"}
+        if abs(at.imag) < ALIKE:
+            look = {"xytext": (0, 5), "va": "bottom", "ha": "left", "rotation": 55, "rotation_mode": "anchor"}
+        names = "\n".join(mode.name for mode in alike)
+        axes.annotate(names, (at.real, at.imag), textcoords="offset points", fontsize=8.5, **look)
