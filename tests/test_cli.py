@@ -1,6 +1,7 @@
 """The command line end to end with made-up wakes; bad input is one line and exit code 2."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -95,7 +96,22 @@ def test_inflow_on_a_slope_with_the_finite_state_model_alone(tmp_path, capsys):
     assert "mountain" in capsys.readouterr().out
 
 
+def test_several_heights_are_a_curve(tmp_path, solver, capsys):
+    file, picture = tmp_path / "a.json", tmp_path / "a.png"
+    heights = ["--height", "1", "2", "--model", "freewake"]
+    assert main(["inflow", *heights, "--json", str(file), "--plot", str(picture)]) == 0
+    points = json.loads(file.read_text())["points"]
+    assert [(p["model"], p["height"]) for p in points] == [("freewake", 1), ("freewake", 2)]
+    assert points[0]["thrust_newton"] == pytest.approx(
+        points[0]["CT"] * 1.225 * math.pi * 8.1778**2 * 220.8**2, rel=1e-3
+    )
+    assert picture.stat().st_size > 10_000
+    assert "thrust, N" in capsys.readouterr().out
+
+
 BAD = {
+    "inflow --height 1 2 --html a.html": "--html goes with one height, but --height has 2",
+    "inflow --height 1 0.2": "height",
     "inflow --height 0.5 --slope 30": "but is 0.5",
     "inflow --height 0": "but is 0.0",
     "inflow --height -1": "but is -1.0",

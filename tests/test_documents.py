@@ -1,6 +1,7 @@
 """Every code block of the README does what it says, in a fresh copy of the repository; every notebook runs."""
 
 import importlib.util
+import json
 import os
 import re
 import shlex
@@ -82,6 +83,8 @@ def test_the_main_command_works_from_a_fresh_clone(clone, studied):
     inflow = sh(INFLOW, clone)
     assert inflow.returncode == 0, inflow.stderr[-2000:]
     assert (out / "inflow.png").exists()
+    thrusts = [point["thrust_newton"] for point in json.loads((out / "inflow.json").read_text())["points"]]
+    assert thrusts == sorted(thrusts, reverse=True)  # more near the ground
 
 
 @pytest.mark.slow

@@ -31,10 +31,10 @@ def add_rotor(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_place(parser: argparse.ArgumentParser, several: bool = False) -> None:
-    """--height (or several of them), --slope and --climb."""
+def add_place(parser: argparse.ArgumentParser) -> None:
+    """--height (one or several), --slope and --climb."""
     about = "hub over ground, over R (none: out of ground effect)"
-    parser.add_argument("--height", type=float, nargs="+" if several else None, metavar="H", help=about)
+    parser.add_argument("--height", type=float, nargs="+", metavar="H", help=about)
     parser.add_argument("--slope", type=float, default=0.0, metavar="DEG", help="slope of the ground in degrees (0)")
     parser.add_argument("--climb", type=float, default=0.0, metavar="V", help="climb velocity over ΩR (0)")
 
@@ -66,14 +66,14 @@ def flown(chosen: argparse.Namespace, base: "Request") -> "tuple[Request, list[f
     return replace(base, operating=operating, thrust=thrust), speeds
 
 
-def case_of(chosen: argparse.Namespace) -> "Case":
-    """The case that --height and --slope ask for. Raises InputError where there is none."""
+def case_of(height: float | None, slope: float) -> "Case":
+    """The case that a --height and --slope ask for. Raises InputError where there is none."""
     from rotorjax.bench.cases import Case
     from rotorjax.errors import InputError
 
-    if chosen.height is None and chosen.slope:
-        raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {chosen.slope:g} deg")
-    case = Case(chosen.height, chosen.slope)
+    if height is None and slope:
+        raise InputError(f"Argument `height` must be given with a slope, but only `slope` is: {slope:g} deg")
+    case = Case(height, slope)
     _ = case.ground
     return case
 

@@ -1,4 +1,4 @@
-"""`rotorjax inflow`: one case, in or out of ground effect, with one model or both."""
+"""`rotorjax inflow`: one case, in or out of ground effect, with one model or both; or thrust and power over heights."""
 
 import argparse
 import sys
@@ -25,8 +25,9 @@ def register(commands: argparse._SubParsersAction) -> None:
     """Add the command."""
     parser = commands.add_parser(
         "inflow",
-        help="inflow of one case",
-        description="Solve one steady case and print thrust, power and inflow. Exit code 1 where it did not converge.",
+        help="inflow of one case, thrust and power over heights",
+        description="Solve one steady case and print thrust, power and inflow; at several heights thrust and power of "
+        "each model with its own blade loads, with --plot as curves. Exit code 1 where a case did not converge.",
     )
     add_rotor(parser)
     add_place(parser)
@@ -47,7 +48,52 @@ def register(commands: argparse._SubParsersAction) -> None:
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Solve the case, print it and write what was asked for; the exit code."""
+    """Solve what was asked for; the exit code."""
+    return (_one if chosen.height is None or len(chosen.height) == 1 else _over_heights)(chosen)
+
+
+def _over_heights(chosen: argparse.Namespace) -> int:
+    """Solve all heights with each model, print them and write what was asked for."""
+    from tqdm import tqdm
+
+    from rotorjax.bench.settings import study_settings
+    from rotorjax.bench.single import Model, check_case, single_case
+    from rotorjax.bench.single_output import check_picture
+    from rotorjax.errors import InputError
+    from rotorjax.io.atomic import check_output, write_json
+
+    for name in ("html", "netcdf", "calibration"):
+        if getattr(chosen, name) is not None:
+            raise InputError(f"Argument `{name}` goes with one height, but --height has {len(chosen.height)}")
+    models: tuple[Model, ...] = ("vpbfsm", "freewake") if chosen.model == "both" else (chosen.model,)
+    cases = [case_of(height, chosen.slope) for height in chosen.height]
+    settings = study_settings(
+        chosen.rotor, chosen.collective, chosen.climb, chosen.harmonics, chosen.quick, flapping=False
+    )
+    for case in cases:
+        check_case(case, settings, chosen.model)
+    check_picture(chosen.plot)
+    for path in (chosen.plot, chosen.json):
+        check_output(path)
+    introduce(settings.rotor, settings.operating)
+    wanted = [(case, model) for model in models for case in cases]
+    bar = tqdm(wanted, desc=settings.rotor.name, unit="case", leave=False, file=sys.stderr)
+    solved = [(single_case(case, settings, model)[0], model) for case, model in bar]
+
+    from rotorjax.bench.over_heights import draw, point, table
+    from rotorjax.bench.plotting import save_file
+
+    points = [point(data, model, settings) for data, model in solved]
+    print(table(points))
+    if chosen.json is not None:
+        write_json(chosen.json, {"points": points})
+    if chosen.plot is not None:
+        save_file(draw(points, settings), chosen.plot)
+    return 0 if all(one["converged"] for one in points) else 1
+
+
+def _one(chosen: argparse.Namespace) -> int:
+    """Solve the case, print it and write what was asked for."""
     from tqdm import tqdm
 
     from rotorjax.bench.record import summary_entry
@@ -57,7 +103,7 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import check_output
 
-    case = case_of(chosen)
+    case = case_of(None if chosen.height is None else chosen.height[0], chosen.slope)
     calibration = calibration_of(chosen)
     changes = {} if calibration is None else calibration.wake_settings
     settings = study_settings(

@@ -31,7 +31,7 @@ def register(commands: argparse._SubParsersAction) -> None:
     add = parser.add_argument
     add_rotor(parser)
     add_flight(parser, required=False)
-    add_place(parser, several=True)
+    add_place(parser)
     add("--tilt", type=float, default=0.0, metavar="DEG", help="shaft forward (0)")
     add(
         "--inflow",
@@ -154,7 +154,7 @@ def _wake(chosen: argparse.Namespace) -> int:
     from rotorjax.wake.settings import MARCHED
 
     _only_the_wake(chosen)
-    case = case_of(chosen)
+    case = case_of(chosen.height, chosen.slope)
     settings = study_settings(chosen.rotor, chosen.collective, chosen.climb, quick=chosen.quick, **MARCHED)
     check_case(case, settings)
     model = model_of(case, settings)

@@ -12,6 +12,7 @@ from rotorjax.io.atomic import write_text
 
 TEMPLATE = Path(__file__).with_name("page.html")
 FOLDED = re.compile(r'(<h2 id="(?:settings|asked-for|time)">.*?</h2>)(.*?)(?=<h2|\Z)', re.DOTALL)  # what few look up
+NUMBER = re.compile(r"<td>(?=[-+−]?\d[^<\s]*</td>)")  # a browser would break 1e-04 behind its sign
 KINDS = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif"}
 
 
@@ -29,6 +30,7 @@ def write_page(path: str | Path, text: str, pictures: Mapping[str, bytes] | None
     given = pictures or {}
     body = re.sub(r'<img ([^>]*?)src="([^"]+)"', lambda m: _embedded(m, path.parent, given), maker.convert(text))
     body = FOLDED.sub(r"<details><summary>\1</summary>\2</details>", body)
+    body = NUMBER.sub('<td class="number">', body)
     body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
     heading = re.search(r"^# (.+)$", text, re.MULTILINE)
     page = TEMPLATE.read_text(encoding="utf-8")

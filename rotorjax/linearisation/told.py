@@ -75,8 +75,8 @@ def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio")
         axes = figure.subplots()
         axes.axvline(0, color=INK, lw=0.8)
         for (value, modes), colour in zip(by_value.items(), series_colours(len(by_value)), strict=True):
-            exponents = np.array([mode.exponent for mode in modes])
-            axes.plot(exponents.real, exponents.imag, "o", color=colour, ms=4.5, label=f"{label} {value:g}")
+            exponents = [mode.exponent for mode in modes]
+            axes.plot(np.real(exponents), np.imag(exponents), "o", color=colour, ms=4.5, label=f"{label} {value:g}")
         _name(axes, list(by_value.values())[len(by_value) // 2])
         axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev")
         axes.legend(loc="upper left")

@@ -72,7 +72,7 @@ def _answer(found: Found) -> str:
     rate = f"{worst.name}, growth {worst.exponent.real:.3g} per radian at {abs(worst.exponent.imag):.3g}/rev"
     damped = f"All modes are damped, the least: {rate}." if worst.exponent.real < 0 else f"It grows, fastest: {rate}."
     loaded = f"README.md beside this page says how {', '.join(f'{name}.mat' for name in found.models)} are loaded."
-    return "\n".join(f"- {line}" for line in (damped, *_teller(found).lines(found), loaded))
+    return "\n".join(f"- {line[0].upper()}{line[1:]}" for line in (damped, *_teller(found).lines(found), loaded))
 
 
 def lines(found: Found) -> str:

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
+from rotorjax.bench.curves import plain
 from rotorjax.sweep.table import axes_of
 
 LABELS = {
@@ -34,6 +35,7 @@ LABELS = {
 PITCH = ("collective_deg", "thrust_coefficient", "weight")
 MAPPED = ("CT", "lambda_0", "lambda_1c", "CP")
 MOST_CURVES = 8
+REST = "Other axes stand at their first value."
 
 
 def draw_all(data: xr.Dataset, folder: Path) -> dict[str, str]:
@@ -60,10 +62,10 @@ def figures(data: xr.Dataset) -> list[tuple[str, Figure, str]]:
         found.append(("polar", polar(shown, pitch, long), about))
     for name in long:
         if name != pitch:
-            about = f"Over {name}, a curve for each value of the next axis; the other axes at their first value."
+            about = f"Over the {_plain(name)}, a curve for each value of the next axis. {REST}"
             found.append((f"over_{_file(name)}", curves(shown, name, long), about))
     if len(long) >= 2:
-        about = f"Maps over {long[0]} and {long[1]}; white where there is no solution. Other axes at their first value."
+        about = f"Over the {_plain(long[0])} and the {_plain(long[1])}; white where there is no solution. {REST}"
         found.append(("map", maps(shown, long[0], long[1]), about))
     return found
 
@@ -188,6 +190,11 @@ def _legend(panel: Axes, series: Sequence[tuple[str, xr.Dataset]]) -> None:
 
 def _label(name: str) -> str:
     return LABELS.get(name, name)
+
+
+def _plain(name: str) -> str:
+    """The same for a sentence."""
+    return plain(_label(name)).partition(",")[0]
 
 
 def _file(name: str) -> str:

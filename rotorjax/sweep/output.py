@@ -65,4 +65,4 @@ def answer(data: xr.Dataset) -> str:
             at = data.isel(dict(zip(data[name].dims, map(int, place), strict=True)))
             where = ", ".join(f"{axis} = {float(at[axis]):.5g}" for axis in axes_of(data))
             found.append(f"{words}: {float(values[place]):.5g} at {where}.")
-    return "\n\n".join(found)
+    return "\n".join(f"- {line}" for line in found)

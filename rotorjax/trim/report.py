@@ -90,8 +90,8 @@ def _answer(rows: Sequence[dict[str, Any]], good: Sequence[dict[str, Any]]) -> s
         ("theta_1s_deg", "Longitudinal cyclic θ₁s"),
         ("tilt_deg", "Shaft"),
     ):
-        low, high = (of(row[key] for row in good) for of in (min, max))
-        if high - low > 0.005:  # what two digits show
+        low, high = (round(of(row[key] for row in good), 2) + 0.0 for of in (min, max))  # no minus zero
+        if high > low:
             found.append(f"{name} from {low:.2f}° to {high:.2f}°.")
     return "\n".join(f"- {line}" for line in found)
 

@@ -37,7 +37,7 @@ def test_the_page_is_whole(tmp_path):
     assert "<title>Inflow &amp; more</title>" in text
     assert text.count("data:image/png;base64,") == 1
     assert 'src="gone.png"' in text, "a picture that is not there stays a link"
-    assert "<td>0.006</td>" in text
+    assert '<td class="number">0.006</td>' in text
     assert 'href="#numbers"' in text
     assert "<ol>" in text
     assert "{{" not in text
