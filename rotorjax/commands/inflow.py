@@ -76,9 +76,11 @@ def _over_heights(chosen: argparse.Namespace) -> int:
     for path in (chosen.plot, chosen.json):
         check_output(path)
     introduce(settings.rotor, settings.operating)
-    wanted = [(case, model) for model in models for case in cases]
-    bar = tqdm(wanted, desc=settings.rotor.name, unit="case", leave=False, file=sys.stderr)
-    solved = [(single_case(case, settings, model)[0], model) for case, model in bar]
+    solved = [
+        (single_case(case, settings, model)[0], model)
+        for model in models
+        for case in tqdm(cases, desc=model, unit="case", leave=False, file=sys.stderr)
+    ]
 
     from rotorjax.bench.over_heights import draw, point, table
     from rotorjax.bench.plotting import save_file
