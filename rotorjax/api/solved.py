@@ -100,7 +100,10 @@ class Solved(eqx.Module):
         return figure
 
     def to_vtk(self, path: str | Path) -> None:
-        """Write the tip vortices of a free wake for ParaView, lengths over R. Raises InputError for another model."""
+        """Write the tip vortices of a free wake, lengths over R: .vtk for ParaView, .vtu for meshio too.
+
+        Raises InputError for another model or ending.
+        """
         from rotorjax.io.vtk import write_polydata
 
         if not isinstance(self.found, Solution):

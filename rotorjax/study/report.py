@@ -48,6 +48,12 @@ def report(
     return "\n\n".join(parts) + "\n"
 
 
+def _span(values: Sequence[float], digits: int) -> str:
+    """From the least to the largest, or the one that they are."""
+    low, high = (f"{of(values):.{digits}f}" for of in (min, max))
+    return low if low == high else f"{low} to {high}"
+
+
 def _answer(reading: Reading, claims: Sequence[Claim]) -> str:
     """Five lines: does the finite-state model follow the free wake, where, by how much, at what cost."""
     level, slopes = reading.level(), [case for case in reading.slopes() if case.slope_deg]
@@ -58,7 +64,7 @@ def _answer(reading: Reading, claims: Sequence[Claim]) -> str:
         found = []
         for model in ("vpbfsm", "printed"):
             rms = [reading.number(case, f"{model}_inflow_rms_difference") for case in cases]
-            found.append(f"{min(rms):.2f}" + (f" to {max(rms):.2f}" if max(rms) - min(rms) >= 0.005 else ""))
+            found.append(_span(rms, 2))
         return f"{found[0]} (as printed {found[1]})"
 
     within = [c.label for c in level if reading.number(c, "vpbfsm_inflow_rms_difference") <= GOOD_AGREEMENT]
@@ -70,8 +76,7 @@ def _answer(reading: Reading, claims: Sequence[Claim]) -> str:
         "ground effect, default choices, and the paper's own in brackets:\n",
         f"1. Out of ground effect: {spans([OGE])}.",
         f"2. Over level ground: {spans(level)}; within {GOOD_AGREEMENT:.2f} at {', '.join(within) or 'no height'}.",
-        f"3. On slopes: {spans(slopes)}; valley less mountain is {min(tilts):.1f} to {max(tilts):.1f} times the free "
-        "wake's."
+        f"3. On slopes: {spans(slopes)}; valley less mountain is {_span(tilts, 1)} times the free wake's."
         if slopes
         else "3. On slopes: not examined.",
         f"4. Of {len(compared)} claims of the paper that the finite-state model enters, "

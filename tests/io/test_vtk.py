@@ -2,6 +2,7 @@
 
 import json
 
+import meshio
 import numpy as np
 import pytest
 from vtk_file import read_polydata
@@ -19,6 +20,23 @@ def test_round_trip(tmp_path):
     assert [list(c) for c in found[1]] == lines
     assert [list(c) for c in found[2]] == polygons
     np.testing.assert_allclose(found[3]["core"], data["core"], rtol=1e-8)
+
+
+def test_meshio_reads_what_is_cut_into_segments(tmp_path):
+    points = np.random.default_rng(0).normal(size=(7, 3))
+    data = {"age_deg": np.arange(7) / 3, "core": np.ones(7)}
+    write_polydata(tmp_path / "a.vtu", points, [[0, 1, 2], [3, 4]], [[2, 3, 5, 6], [0, 4, 5]], data)
+    found = meshio.read(tmp_path / "a.vtu")
+    np.testing.assert_allclose(found.points, points, rtol=1e-8)
+    assert found.cells_dict["line"].tolist() == [[0, 1], [1, 2], [3, 4]]
+    assert found.cells_dict["quad"].tolist() == [[2, 3, 5, 6]]
+    assert found.cells_dict["triangle"].tolist() == [[0, 4, 5]]
+    np.testing.assert_allclose(found.point_data["age_deg"].ravel(), data["age_deg"], rtol=1e-8)
+
+
+def test_an_ending_that_readers_take_for_another_format_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"must end in \.vtk .* or \.vtu .*, but is '.*wake\.vtp'"):
+        write_polydata(tmp_path / "wake.vtp", np.zeros((4, 3)), [], [], {})
 
 
 def test_data_that_does_not_fit_is_refused(tmp_path):

@@ -114,14 +114,14 @@ def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial,
 @pytest.mark.slow
 def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
     coaxial.plot(tmp_path / "pair.png")
-    coaxial.to_vtk(tmp_path / "pair.vtp")
+    coaxial.to_vtk(tmp_path / "pair.vtk")
     data = coaxial.to_xarray()
     assert dict(data.sizes)["rotor"] == 2
     np.testing.assert_allclose(data["CT"], THRUST, rtol=1e-6)
     paths = coaxial.tip_vortices()
     assert paths.shape[:2] == (2, 4)
     assert np.all(paths[1, ..., 2].max(axis=1) < paths[0, ..., 2].max(axis=1))
-    assert (tmp_path / "pair.vtp").stat().st_size > 1000
+    assert (tmp_path / "pair.vtk").stat().st_size > 1000
 
 
 BAD = {
