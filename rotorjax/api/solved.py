@@ -5,18 +5,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.api.models import FiniteState
+from rotorjax.bench.mean_flow import mean_velocity
 from rotorjax.errors import InputError
-from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
 from rotorjax.inflow.balance import Balance, balance
 from rotorjax.potential import model as potential
-from rotorjax.wake import field, sensitivity
+from rotorjax.wake import sensitivity
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.several import SeveralWakes
 from rotorjax.wake.solution import Solution, tip_vortices
@@ -184,19 +183,9 @@ def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) ->
     """
     points = jnp.asarray(points, float)
     if isinstance(solved.found, Solution):
-        return _mean_velocity(solved.found, points, instants)
+        return mean_velocity(solved.found, points, instants)
     assert isinstance(solved.model, FiniteState)
     return potential.velocity(solved.found.state, points, solved.model.flow)
-
-
-@eqx.filter_jit
-def _mean_velocity(found: Solution, points: Float[Array, "N 3"], instants: int) -> Float[Array, "N 3"]:
-    if found.state.near.shape[0] > 1:
-        return jnp.mean(field.velocity(found.state, points, found.model), axis=0)
-    turns = 2 * jnp.pi / (found.model.rotor.blades * instants) * jnp.arange(instants)
-    seen = jax.vmap(lambda angle: rotate_about_shaft(points, -angle))(turns)
-    flow = field.velocity(found.state, seen.reshape(-1, 3), found.model)[0].reshape(seen.shape)
-    return jnp.mean(jax.vmap(rotate_about_shaft)(flow, turns), axis=0)
 
 
 def performance(solved: Solved) -> Performance:

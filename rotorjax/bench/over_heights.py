@@ -1,6 +1,6 @@
 """Thrust and power over height at one collective, each model with its own blade loads."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import xarray as xr
@@ -32,13 +32,18 @@ def point(data: xr.Dataset, model: str, settings: StudySettings) -> dict[str, An
     }
 
 
-def table(points: Iterable[dict[str, Any]]) -> str:
-    """A line a point, as aligned text."""
+def table(points: Sequence[dict[str, Any]]) -> str:
+    """A line a point, as aligned text; of both models how far apart they are."""
     lines = [f"{'model':<10}{'h/R':>7}{'thrust, N':>12}{'power, kW':>12}{'C_T':>10}{'inflow/ΩR':>11}"]
     for one in points:
         forces = f"{one['thrust_newton']:12.0f}{one['power_watt'] / 1e3:12.1f}"
         lost = "" if one["converged"] else f"  NOT CONVERGED: {one['why']}"
         lines.append(f"{one['model']:<10}{one['height']:7g}{forces}{one['CT']:10.5f}{one['mean_inflow']:11.5f}{lost}")
+    by_model = [{p["height"]: p["CT"] for p in points if p["model"] == model and p["converged"]} for model in MODELS]
+    ratios = [by_model[1][h] / by_model[0][h] for h in by_model[0] if h in by_model[1]]
+    if ratios:
+        lines.append(f"thrust of the VPBFSM over the free wake's: {min(ratios):.3f} to {max(ratios):.3f}")
+        lines.append("both models beside measurements: VALIDATION.md")
     return "\n".join(lines)
 
 

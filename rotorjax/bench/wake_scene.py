@@ -1,15 +1,19 @@
-"""A free wake as a scene to turn: blades, near wake, tip vortices and inboard filaments over the ground."""
+"""A free wake as a scene to turn: blades, near wake, vortices, streamlines of the mean flow, the ground."""
 
 import numpy as np
 from jaxtyping import Float
 
+from rotorjax.bench.mean_flow import streamlines
 from rotorjax.io.scene import Layer, Scene
 from rotorjax.wake.seen import Seen, seen_around
 from rotorjax.wake.solution import Solution
 
 
-def solved_scene(found: Solution) -> Scene:
-    """The scene of a periodic wake: an axisymmetric one turns as it is, another has a frame for each azimuth."""
+def solved_scene(found: Solution, streams: bool = True) -> Scene:
+    """The scene of a periodic wake: an axisymmetric one turns as it is, another has a frame for each azimuth.
+
+    streams: with streamlines of the mean flow, which take some seconds.
+    """
     model = found.model
     frames = seen_around(model, found.state)
     count = len(frames.bound)
@@ -18,7 +22,10 @@ def solved_scene(found: Solution) -> Scene:
     slope = 0.0 if model.ground is None else float(np.rad2deg(model.ground.slope))
     return Scene(
         title=f"{model.rotor.name}, {where}" + (f", slope {slope:g}°" if slope else ""),
-        layers=layers(frames, np.rad2deg(np.asarray(model.settings.filament_ages))),
+        layers=(
+            *layers(frames, np.rad2deg(np.asarray(model.settings.filament_ages))),
+            *((Layer("streamlines", streamlines(found)[None], 0.004, shown=False),) if streams else ()),
+        ),
         facts=_facts(found),
         times=tuple(f"ψ = {p:.0f}°" for p in psi),
         height=None if model.ground is None else float(model.ground.height),

@@ -61,7 +61,7 @@ def _write_wakes(cases: Sequence[xr.Dataset], settings: StudySettings, folder: P
         rigid = {attribute: float(data[name]) for name, (attribute, _) in RIGID.items() if name in data}
         wake = replace(to_solution(data, settings), **rigid, **({"CP": float("nan")} if rigid else {}))
         written[case_of(data).label] = f"wakes/{case_of(data).name}.html"
-        write_scene(make_folder(folder / "wakes") / f"{case_of(data).name}.html", solved_scene(wake))
+        write_scene(make_folder(folder / "wakes") / f"{case_of(data).name}.html", solved_scene(wake, streams=False))
     return written
 
 

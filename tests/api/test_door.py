@@ -11,6 +11,7 @@ import xarray as xr
 from wakes import COARSE
 
 import rotorjax as rj
+from rotorjax.bench.mean_flow import LENGTH, streamlines
 from rotorjax.ode.models import LinearModel
 from rotorjax.potential import model as potential
 
@@ -119,6 +120,19 @@ def test_the_mean_velocity_of_a_wake_is_alike_all_round_and_stops_at_the_ground(
     assert float(down[0]) < -0.01
     on_ground = rj.velocity(wake, around.at[:, 2].set(-1.0))
     assert float(jnp.max(jnp.abs(on_ground[:, 2]))) < 1e-12
+
+
+@pytest.mark.slow
+def test_streamlines_go_along_the_flow_and_stay_above_the_ground(wake):
+    """Equal steps; no line reaches the plane; between two nodes a line runs as the flow does there."""
+    lines = streamlines(wake.found)
+    steps = np.diff(lines, axis=1)
+    np.testing.assert_allclose(np.linalg.norm(steps, axis=-1), LENGTH, rtol=1e-3)
+    assert lines[..., 2].min() > -1.0
+    some = lines[::13, 5:60:18]
+    flow = np.asarray(rj.velocity(wake, (some + steps[::13, 5:60:18] / 2).reshape(-1, 3)))
+    along = np.sum(flow * steps[::13, 5:60:18].reshape(-1, 3), axis=1) / np.linalg.norm(flow, axis=1)
+    np.testing.assert_allclose(along, LENGTH, rtol=2e-2)
 
 
 def test_wrong_input_is_named(wake, over_ground):
