@@ -8,6 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -144,6 +145,12 @@ def test_python_example(capsys):
 def test_files_that_the_readme_names_exist():
     for name in re.findall(r"`((?:notebooks|rotorjax)/[\w./]+)`|\]\(([\w./-]+)\)", README):
         assert (ROOT / (name[0] or name[1])).exists(), name
+
+
+def test_the_badges_are_true():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    told = re.findall(r'class="value">([^<]+)<', (ROOT / "docs" / "assets" / "badges.svg").read_text())
+    assert told == [project["requires-python"].replace(">=", "≥ "), rj.__version__, project["license"]]
 
 
 def lines_of(script):
