@@ -29,3 +29,12 @@ def seen(page, tmp_path):
     ran = subprocess.run([BROWSER, *FLAGS, *own], capture_output=True, text=True, timeout=120, check=True)
     said = [line for line in ran.stderr.splitlines() if "CONSOLE" in line]
     return plt.imread(picture)[..., :3], [line for line in said if "GPU stall due to ReadPixels" not in line]
+
+
+def opens(page, tmp_path):
+    """Whether a report is drawn, its pictures inside, without a complaint; true where no browser is."""
+    if BROWSER is None:
+        return True
+    picture, said = seen(page, tmp_path)
+    inside = "data:image/" in page.read_text(encoding="utf-8")
+    return inside and said == [] and picture.std() > 0.02

@@ -14,6 +14,7 @@ from rotorjax.bench.single import single_case
 from rotorjax.cli import WITHOUT_FREE_WAKE, main
 from rotorjax.io import netcdf
 from rotorjax.study.run import solve_cases
+from tests.browser import opens
 
 
 @pytest.fixture
@@ -43,6 +44,7 @@ def test_study_writes_everything_and_says_where(tmp_path, solver, capsys):
         "fig12.png",
     }
     assert not list(out.glob("*.pdf"))  # a first look needs none
+    assert opens(out / "report.html", tmp_path)
     assert sorted(p.stem for p in (out / "cases").iterdir()) == ["h1", "h1-slope15", "h1.5", "h2", "oge"]
 
 

@@ -1,6 +1,7 @@
 """What `rotorjax validate` leaves behind: pictures, validation.json, validation.md and the same as a page."""
 
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ def write(found: Validation, folder: str | Path) -> None:
     write_json(folder / "validation.json", summary(found))
     text = report(found)
     write_text(folder / "validation.md", text)
-    write_page(folder / "validation.html", text)
+    write_page(folder / "validation.html", PICTURE.sub(r"![\1](\1)", text))
 
 
 def summary(found: Validation) -> dict[str, Any]:
@@ -66,6 +67,7 @@ def wake_settings_of(found: Validation) -> dict[str, Any]:
     return {k: v for k, v in at.settings(found.subject.quick).table().items() if k.startswith("wake.")}
 
 
+PICTURE = re.compile(r"^Picture: `(.+)`\.$", re.MULTILINE)  # named in the text, shown on the page
 HEAD = ("quantity", "ours", "reference", "difference", "allowed", "verdict")
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from rotorjax.cli import main
 from rotorjax.io import netcdf
+from tests.browser import opens
 
 LANDING = """
 [rotor]
@@ -41,6 +42,7 @@ def test_landing_writes_everything(tmp_path, capsys):
     pictures = {"histories.png", "histories.pdf", "disk.png", "disk.pdf", "animation.gif"}
     assert {p.name for p in out.iterdir()} == {"history.nc", "report.json", "report.html"} | pictures
     assert (out / "report.html").read_text().count("data:image/") == 3
+    assert opens(out / "report.html", tmp_path)
     report = json.loads((out / "report.json").read_text())
     data = netcdf.read(out / "history.nc")
     assert report["histories"]["uniform"]["last"] == pytest.approx(float(data["uniform"][-1]))

@@ -13,6 +13,7 @@ from rotorjax.cli import main
 from rotorjax.io import netcdf
 from rotorjax.wake import solution
 from rotorjax.wake.settings import wake_settings
+from tests.browser import opens
 
 
 @pytest.fixture(autouse=True)
@@ -56,6 +57,7 @@ def test_a_trimmed_rotor_at_one_speed_and_over_two(tmp_path, capsys):
     files = {f"{name}.{end}" for name in ("reduced", "full", "periodic") for end in ("mat", "nc")}
     files |= {"README.md", "report.md", "report.html", "linearise.json", "roots.png", "roots.pdf"}
     assert {path.name for path in (tmp_path / "one").iterdir()} == files
+    assert opens(tmp_path / "one" / "report.html", tmp_path)
     found = json.loads((tmp_path / "one" / "linearise.json").read_text())
     model = scipy.io.loadmat(tmp_path / "one" / "full.mat", simplify_cells=True)
     # seconds: the same poles, Ω times as fast; forces in newtons

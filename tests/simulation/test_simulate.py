@@ -19,6 +19,7 @@ from rotorjax.simulation.run import driver_of
 from rotorjax.simulation.start import from_trim
 from rotorjax.trim.run import prepare
 from rotorjax.trim.solve import Trimmed, guess
+from tests.browser import opens
 
 FLIGHT = '[flight]\nrotor = "uh60"\ninflow = "pitt-peters"\nthrust_coefficient = 0.00575\n'
 TIME = "[time]\nduration = 0.5\nsteps_per_turn = 72\n"
@@ -95,6 +96,7 @@ def test_the_files(flown):
         assert (folder / name).stat().st_size > 10_000
     page = (folder / "report.html").read_text()
     assert page.count("data:image/") == 2
+    assert opens(folder / "report.html", folder)
     assert f"C_T goes from {told['histories']['CT']['first']:.5f}" in page
 
 

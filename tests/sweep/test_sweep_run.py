@@ -18,6 +18,7 @@ from rotorjax.io import netcdf
 from rotorjax.sweep.case import sweep_case
 from rotorjax.sweep.found import Found, Start, from_best, judged
 from rotorjax.sweep.pools import Cluster, Processes, packed, unpacked
+from tests.browser import opens
 
 TESTS = Path(__file__).parents[1]
 
@@ -111,6 +112,7 @@ def test_failures_are_named_left_out_and_nothing_starts_from_them(tmp_path, monk
     page = (out / "report.html").read_text()
     assert "made up to fail" in page
     assert "data:image/png" in page
+    assert opens(out / "report.html", tmp_path)
     assert main([*line, "--table", str(tmp_path / "t.txt")]) == 2
     assert "2 of 5 did not" in capsys.readouterr().err
 

@@ -15,6 +15,7 @@ from rotorjax.ode.trajectory import integrate
 from rotorjax.trim.problem import inputs_at, node_azimuths, outputs_at, revolution
 from rotorjax.trim.run import numbers, prepare, request, run
 from rotorjax.trim.solve import power, trim, trimmed_power
+from tests.browser import opens
 
 THRUST = 0.00575
 
@@ -164,6 +165,7 @@ def test_a_curve_over_speed(tmp_path, cruise, told):
     assert picture.stat().st_size > 10_000
     told = page.read_text()
     assert told.count("data:image/png") == 1
+    assert opens(page, tmp_path)
     assert "3 of 3 points converged" in told
     assert f"{points[2]['power_watt'] / 1e3:.0f} kW (C_P = {points[2]['CP']:.4e}) at advance ratio 0.2" in told
 

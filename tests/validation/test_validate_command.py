@@ -9,6 +9,7 @@ from wakes import fails_at, made_up
 from rotorjax.cli import main
 from rotorjax.validation import momentum
 from rotorjax.validation.run import validate
+from tests.browser import opens
 
 
 @pytest.fixture
@@ -26,6 +27,7 @@ def test_one_case_writes_everything(tmp_path, solver, capsys):
     assert main(["validate", "--out", str(out), "--quick", "--case", "momentum"]) == 1  # made up: no momentum theory
     names = {"validation.json", "validation.md", "validation.html", "momentum.png", "momentum.pdf"}
     assert {p.name for p in out.iterdir()} == names
+    assert opens(out / "validation.html", tmp_path)
     found = json.loads((out / "validation.json").read_text())
     verdicts = [row["verdict"] for row in found["rows"]]
     assert found["out"] == verdicts.count("out") > 0
