@@ -8,6 +8,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,8 +17,10 @@ from rotorjax.errors import InputError
 
 DIVERGED, BAD_INPUT, FAULT, INTERRUPTED, CLOSED = 1, 2, 70, 130, 141
 # XLA's older way to write fused loops takes a third less to compile and as long to run, but for the derivative of the
-# Biot-Savart sum, which takes twice as long: not where a free wake is solved (benchmarks/xla_flags.py)
-WITHOUT_FREE_WAKE = "--xla_cpu_use_fusion_emitters=false"
+# Biot-Savart sum, which takes twice as long: not where a free wake is solved (benchmarks/xla_flags.py). Later versions
+# have no such flag, and XLA ends the process for one that it does not know
+HAS_OLDER_WAY = tuple(map(int, version("jaxlib").split(".")[:2])) < (0, 11)
+WITHOUT_FREE_WAKE = "--xla_cpu_use_fusion_emitters=false" if HAS_OLDER_WAY else ""
 
 
 class Parser(argparse.ArgumentParser):

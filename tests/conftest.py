@@ -10,12 +10,12 @@ import gc
 import os
 from pathlib import Path
 
+from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
 # XLA's older way to write fused loops and LLVM's first level: the same sums, and half to compile; read when jax starts.
 # Level 0 halves that again, but its programs run three times as long: for all but the study and a wake's linear map
-os.environ["XLA_FLAGS"] = (
-    f"{os.environ.get('XLA_FLAGS', '')} --xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
-)
+os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {WITHOUT_FREE_WAKE} --xla_backend_optimization_level=1"
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's own hints are no errors
 
@@ -28,8 +28,7 @@ SHORTEST = 0.3  # seconds of compilation that are worth a file
 MUCH_RUN = {
     "xla_backend_optimization_level": 1,
     "xla_llvm_disable_expensive_passes": False,
-    "xla_cpu_use_fusion_emitters": True,
-}
+} | ({"xla_cpu_use_fusion_emitters": True} if HAS_OLDER_WAY else {})
 
 gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other
 

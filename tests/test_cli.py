@@ -11,7 +11,7 @@ import pytest
 from wakes import fails_at, made_up
 
 from rotorjax.bench.single import single_case
-from rotorjax.cli import WITHOUT_FREE_WAKE, main
+from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE, main
 from rotorjax.io import netcdf
 from rotorjax.study.run import solve_cases
 from tests.browser import opens
@@ -234,7 +234,7 @@ def test_only_what_solves_no_free_wake_is_compiled_the_older_way(line, quick):
     )
     flags = run.stdout.split()[1:]
     assert flags[-1] == "--xla_cpu_enable_fast_math=false"  # the user's own count
-    assert (WITHOUT_FREE_WAKE in flags) == quick
+    assert (WITHOUT_FREE_WAKE in flags) == (quick and HAS_OLDER_WAY)
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "ascii"])
