@@ -178,17 +178,7 @@ def finite_state_model(
     (`rotorjax.region`, best with ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk.
     Raises InputError where a count or a setting is not allowed.
     """
-    chosen: dict[str, Any] = {
-        "strengths": "closed",
-        "ground_parity": "odd",
-        "ground_in_mass_flow": True,
-        "slope": "tilted",
-        "wake": contraction(),
-        "wake_edge": "free" if surfaces is None else "rigid",
-        "mass_flow": "harmonics",
-        **(PRINTED if printed else {}),
-        **settings,
-    }
+    chosen: dict[str, Any] = {**(PRINTED if printed else _default(surfaces)), **settings}
     _check(chosen, harmonics, ground_harmonics)
     _check_height(ground, chosen)
     if surfaces is not None:
@@ -205,6 +195,19 @@ def finite_state_model(
         None if radius is None else jnp.asarray(radius, float),
         surfaces=None if surfaces is None else solid(surfaces, ground),
         **{name: chosen[name] for name in ("wake", "strengths", "ground_in_mass_flow", "slope", "wake_edge")},
+    )
+
+
+def _default(surfaces: Panels | None) -> Settings:
+    """The choices that agree best; beside surfaces the wake keeps its edge."""
+    return Settings(
+        strengths="closed",
+        ground_parity="odd",
+        ground_in_mass_flow=True,
+        slope="tilted",
+        wake=contraction(),
+        wake_edge="free" if surfaces is None else "rigid",
+        mass_flow="harmonics",
     )
 
 
