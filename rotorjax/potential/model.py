@@ -107,8 +107,9 @@ class FiniteStateModel(eqx.Module):
     p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). wake: how it contracts
     far from the ground, None for a cylinder. surfaces: beside and under the rotor, or None. region: the part of the
     plane where there is ground, None for all of it. ground_radius (): of the ground disk, over R, None for that of the
-    wake there. strengths, ground_in_mass_flow, slope, wake_edge, mass_flow: static, see the module's head; mass_flow
-    "paper" gives V_T to a_1^0 and V̄ to all others, "linear" V_T to all, "harmonics" V_T to the axisymmetric ones.
+    wake there. lean (): tan χ of the wake in a wind, which a free edge alone heeds. strengths, ground_in_mass_flow,
+    slope, wake_edge, mass_flow: static, see the module's head; mass_flow "paper" gives V_T to a_1^0 and V̄ to all
+    others, "linear" V_T to all, "harmonics" V_T to the axisymmetric ones.
     """
 
     modes: ModeTable
@@ -125,6 +126,7 @@ class FiniteStateModel(eqx.Module):
     ground_in_mass_flow: bool = eqx.field(static=True, default=False)
     slope: Slope = eqx.field(static=True, default="sheared")
     wake_edge: WakeEdge = eqx.field(static=True, default="rigid")
+    lean: Float[Array, ""] | float = 0.0
 
     def __check_init__(self) -> None:
         """Raise InputError where the modes' parities do not match their use."""
@@ -340,7 +342,7 @@ def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "
     """Return the upward velocity of unit ground states at hub-frame points above a plane (Eqs. 35, 46)."""
     if model.wake_edge == "free":
         wake = wake_over(model, ground)
-        return with_free_edge(lambda places: _sources_upflow(model, ground, places), ground, wake, points)
+        return with_free_edge(lambda places: _sources_upflow(model, ground, places), ground, wake, model.lean, points)
     return _sources_upflow(model, ground, points)
 
 

@@ -15,6 +15,10 @@ nothing of that: they fade with the powers of the distance, all harmonics alike.
 of what they send is left. There is nothing to choose in it. On the ground it is 1, so that the plane stays closed, and
 the mean over the disk is untouched. Harmonics across which the sign stays, from the second on, are left as they are:
 on a slope they are of its second order.
+
+In a wind the wake's foot lies h tan χ downwind, and what rises to the disk beside the wake meets no edge: of what is
+lost the share e^{−(h tan χ)²} is, within a tenth that of the disk that two circles so far apart have in common, and
+smooth.
 """
 
 from collections.abc import Callable
@@ -41,18 +45,19 @@ def with_free_edge(
     upflow: Callable[[Float[Array, "*N 3"]], Float[Array, "G ..."]],
     ground: Plane,
     wake: Contraction | None,
+    lean: Float[Array, ""] | float,
     points: Float[Array, "*N 3"],
 ) -> Float[Array, "G ..."]:
     """Return the ground's upflow at hub-frame points with the part that is odd across the shaft as a jet lets it by.
 
-    upflow: of a wake that keeps its place. wake: over this plane. Between disk and plane a point has its opposite at
-    the same share of the way down; beyond the disk's edge the wake's answer fades as r⁻⁴.
+    upflow: of a wake that keeps its place. wake: over this plane. lean: tan χ. Between disk and plane a
+    point has its opposite at the same share of the way down; beyond the disk's edge the wake's answer fades as r⁻⁴.
     """
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     own, across = depth(ground, x), jnp.maximum(depth(ground, -x), 0.0)
     down = jnp.clip(-z / jnp.maximum(own, 1e-6), 0.0, 1.0)  # share of the way from the disk to the plane
     opposite = jnp.stack([-x, -y, jnp.maximum(jnp.maximum(z, 0.0) - down * across, -depth(ground, -x))], axis=-1)
     here, there = jnp.moveaxis(upflow(jnp.stack([points, opposite])), 1, 0)
-    near = 1 / (1 + jnp.maximum(x**2 + y**2 - 1, 0.0) ** 2)
+    near = jnp.exp(-((lean * ground.height) ** 2)) / (1 + jnp.maximum(x**2 + y**2 - 1, 0.0) ** 2)
     lost = near * (1 - left_of_tilt(wake, down * ground.height, ground.height))
     return here - lost / 2 * (here - there)

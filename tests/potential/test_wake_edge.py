@@ -94,3 +94,18 @@ def test_an_edge_that_does_not_exist_or_beside_surfaces_is_refused():
         finite_state_model(wake_edge="loose")  # pyright: ignore[reportArgumentType]
     with pytest.raises(InputError, match="`wake_edge` must be 'rigid' beside surfaces"):
         finite_state_model(surfaces=wall(1.5, -1.0, 1.0), wake_edge="free")
+
+
+def test_a_wake_that_leans_away_leaves_the_disk_to_the_ground():
+    """By the share that two circles so far apart have in common, within a tenth: the whole in hover, none far away."""
+    free, rigid = pair(plane(1.0))
+    points = jnp.array([[0.5, 0.2, 0.0]])
+    bare = ground_upflow(rigid, plane(1.0), points)
+
+    def taken(lean):
+        return bare - ground_upflow(eqx.tree_at(lambda m: m.lean, free, lean), plane(1.0), points)
+
+    hover = taken(0.0)
+    for apart in (0.5, 1.0, 1.5, 2.0):
+        common = 2 / np.pi * (np.arccos(apart / 2) - apart / 2 * np.sqrt(1 - apart**2 / 4))
+        np.testing.assert_allclose(taken(apart), common * hover, atol=0.1 * np.abs(hover).max())
