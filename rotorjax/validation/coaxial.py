@@ -32,6 +32,8 @@ KINDS = ("single", "pair")
 COLUMNS = ("rotors", "CT", "CQ")
 BALANCED = 0.01
 """Difference of the two torques, over the upper one, at which they count as equal."""
+MOST = 6
+"""Pairs solved for one balance."""
 MOMENTUM = Against(
     "momentum theory, in one plane and with the lower rotor in the upper one's far wake",
     "uniform inflow on both disks",
@@ -41,10 +43,13 @@ MEASURED = Against("the user's points, `--measured`", "theirs", "the aim set for
 
 
 class Balanced(NamedTuple):
-    """A pair whose rotors take the same torque. gap: by how much they do not, over the upper one's."""
+    """A pair whose rotors take the same torque. gap: by how much they do not, over the upper one's. more: degrees of
+    the lower rotor's pitch beyond the upper one's.
+    """
 
     pair: SeveralSolution
     gap: float
+    more: float
 
 
 def far_flow(ratio: float) -> float:
@@ -112,28 +117,33 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
 
 
 def balanced_pairs(tasks: Sequence[Point], quick: bool) -> list[Balanced]:
-    """The pair at each mean collective, the lower rotor's pitch moved by the secant rule until torques are equal."""
+    """The pair at each mean collective, each from the one before."""
     found: list[Balanced] = []
-    more, last = 0.5, None  # degrees of the lower rotor beyond the upper one
     for task in tasks:
-        settings, here = task.settings(quick), None
-        for _ in range(6):
-            pitches = [task.collective_deg - more / 2, task.collective_deg + more / 2]
-            model = several_wakes(
-                settings.rotor,
-                settings.operating,
-                [(0, 0, 0), (0, 0, -SPACING)],
-                settings=settings.wake,
-                collectives_deg=pitches,
-            )
-            last = solve_several(model, last)
-            gap = float(last.CP[1] / last.CP[0] - 1)
-            if abs(gap) < BALANCED or not last.converged:
-                break
-            step = 0.5 if here is None else -gap * (more - here[0]) / (gap - here[1])
-            here, more = (more, gap), more + float(np.clip(step, -2, 2))
-        found.append(Balanced(last, gap))
+        found.append(balanced(task, quick, found[-1] if found else None))
     return found
+
+
+def balanced(task: Point, quick: bool, near: Balanced | None) -> Balanced:
+    """The pair at a mean collective, the lower rotor's pitch moved by the secant rule until torques are equal."""
+    settings = task.settings(quick)
+    pair, more, before = (None, 0.5, None) if near is None else (near.pair, near.more, None)
+    for _ in range(MOST):
+        pitches = task.collective_deg + 0.5 * more * np.array([-1.0, 1.0])
+        model = several_wakes(
+            settings.rotor,
+            settings.operating,
+            [(0, 0, 0), (0, 0, -SPACING)],
+            settings=settings.wake,
+            collectives_deg=pitches,
+        )
+        pair = solve_several(model, pair)
+        here = Balanced(pair, float(pair.CP[1] / pair.CP[0] - 1), more)
+        if abs(here.gap) < BALANCED or not pair.converged:
+            break
+        step = 0.5 if before is None else -here.gap * (more - before.more) / (here.gap - before.gap)
+        before, more = here, more + float(np.clip(step, -2, 2))
+    return here
 
 
 def polar(subject: Subject, wakes: Wakes, pairs: Sequence[Balanced]) -> dict[str, np.ndarray]:
@@ -148,7 +158,7 @@ def momentum_rows(subject: Subject, wakes: Wakes, pairs: Sequence[Balanced]) -> 
     """Induced power over that of two rotors alone, each with half of the thrust, and the upper one's share of it."""
     rows, far = [], far_balance()
     factor = (far**1.5 + (1 - far) * far_flow(1 / far - 1) * far**0.5) / 2 / 0.5**1.5
-    for at, (pair, gap) in zip(points(subject), pairs, strict=True):
+    for at, (pair, gap, _) in zip(points(subject), pairs, strict=True):
         single, nan = wakes[at], float("nan")
         thrust, ok = float(pair.CT.sum()), pair.converged and abs(gap) < BALANCED
         alone = 2 * single.CP_induced * (thrust / 2 / single.CT) ** 1.5

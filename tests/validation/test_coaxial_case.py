@@ -34,7 +34,7 @@ def compared(measured=None):
         )
         pair = SimpleNamespace(**vars(PAIR) | {"CT": PAIR.CT * scale, "CP_induced": PAIR.CP_induced * power})
         pair.CP = pair.CP_induced
-        pairs.append(coaxial.Balanced(pair, 0.001))
+        pairs.append(coaxial.Balanced(pair, 0.001, 0.5))
     return subject, wakes, pairs
 
 
@@ -44,7 +44,7 @@ def test_rows_of_pairs_between_the_two_ends():
     assert rows[0].ours == pytest.approx(1.3)
     assert (rows[0].limits.low, rows[0].limits.high) == (pytest.approx(1.2810, abs=1e-4), pytest.approx(np.sqrt(2)))
     subject, wakes, pairs = compared()
-    lost = coaxial.momentum_rows(subject, wakes, [coaxial.Balanced(pairs[0].pair, 0.1), *pairs[1:]])
+    lost = coaxial.momentum_rows(subject, wakes, [coaxial.Balanced(pairs[0].pair, 0.1, 0.5), *pairs[1:]])
     assert [row.met for row in lost] == [False] * 2 + [True] * 6
     assert "torques differ by 10.0 %" in lost[0].note
 
