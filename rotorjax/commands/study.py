@@ -1,6 +1,7 @@
 """`rotorjax study`: the paper's evaluation with both models, as figures, data and a report."""
 
 import argparse
+import sys
 import time
 from pathlib import Path
 
@@ -74,6 +75,8 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _arranged(chosen: argparse.Namespace) -> int:
     """Solve a case file by both models; the exit code."""
+    from tqdm import tqdm
+
     from rotorjax.errors import InputError
     from rotorjax.io.atomic import make_folder
     from rotorjax.study.arranged import solve_arrangement, write_arranged
@@ -86,7 +89,13 @@ def _arranged(chosen: argparse.Namespace) -> int:
     case = read_arrangement(chosen.config, chosen.quick)
     folder = make_folder(chosen.out)
     introduce(case.settings.rotor, case.settings.operating)
-    found = solve_arrangement(case)
+    with tqdm(desc="study", unit="step", file=sys.stderr) as bar:
+
+        def progress(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}", refresh=False)
+            bar.update(1)
+
+        found = solve_arrangement(case, progress)
     write_arranged(found, folder)
     print(f"{len(case.places)} rotors in {found.seconds:.0f} s: {folder / 'report.html'}")
     if not found.wake.converged:
