@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from rotorjax.api.solved import Solved
+from rotorjax.checks import refuse
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
@@ -194,6 +195,10 @@ def march(
             raise InputError(f"Argument `{next(iter(options))}` is of a march of the rotor: a linear model has none")
         return linear_march(about, steps_per_turn)
     from rotorjax.simulation.march import march
+    from rotorjax.trim.run import Result
+
+    if not isinstance(about, Result):
+        raise refuse("about", "be a trim of one rotor (rj.trim) or its linear model", f"a {type(about).__name__}")
 
     return march(about, steps_per_turn, **options)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 from matplotlib.figure import Figure
 
 from rotorjax.bench.azimuth import refine_azimuth
@@ -21,6 +21,7 @@ from rotorjax.inflow.balance import Stations, pressure
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json, write_text
 from rotorjax.io.page import write_page
+from rotorjax.panels.kernel import solid_angles
 from rotorjax.panels.surface import told
 from rotorjax.potential.model import finite_state_model
 from rotorjax.potential.rotors import Rotors, inflow_at, mean_inflows, rotors, steady, velocity
@@ -206,6 +207,14 @@ def draw_maps(found: Arranged) -> Figure:
     return figure
 
 
+def within(case: Arrangement, points: Float[Array, "P 3"]) -> Bool[np.ndarray, " P"]:
+    """Which points lie inside a closed surface, where there is no air."""
+    if case.surfaces is None:
+        return np.zeros(len(points), bool)
+    angle = jnp.sum(solid_angles(points, case.surfaces.corners), axis=1)
+    return np.asarray(angle < -2 * np.pi)
+
+
 def draw_outwash(found: Arranged) -> Figure:
     """Mean wind along the ground, NEAR_GROUND over it, by each model."""
     places, ground = found.case.places, found.case.ground
@@ -215,15 +224,17 @@ def draw_outwash(found: Arranged) -> Figure:
     z = np.full_like(x, NEAR_GROUND - float(ground.height))
     points = jnp.asarray(np.stack([x, y, z], axis=-1).reshape(-1, 3))
     winds = {name: np.asarray(flow(points)).reshape(*x.shape, 3) for name, flow in found.flows.items()}
-    speeds = {name: np.hypot(wind[..., 0], wind[..., 1]) for name, wind in winds.items()}
-    levels = shared_levels([np.minimum(speed, np.quantile(speed, 0.995)) for speed in speeds.values()])
+    inside = within(found.case, points).reshape(x.shape)
+    speeds = {name: np.where(inside, np.nan, np.hypot(wind[..., 0], wind[..., 1])) for name, wind in winds.items()}
+    levels = shared_levels([np.minimum(speed, np.nanquantile(speed, 0.995)) for speed in speeds.values()])
     turn = np.linspace(0, 2 * np.pi, 100)
     with style():
-        figure = new_figure(11.0, 1.2 + 5.0 * np.ptp(reach[1]) / np.ptp(reach[0]))
-        for k, (name, wind) in enumerate(winds.items()):
-            axes = figure.add_subplot(1, 2, k + 1)
+        figure = new_figure(11.0, 1.0 + 4.4 * np.ptp(reach[1]) / np.ptp(reach[0]))
+        for i, (name, wind) in enumerate(winds.items()):
+            axes = figure.add_subplot(1, 2, i + 1, facecolor="#7a5c3e")
             filled = axes.contourf(x, y, speeds[name], levels=levels, cmap="viridis", extend="max")
-            axes.streamplot(x[0], y[:, 0], wind[..., 0], wind[..., 1], color="white", linewidth=0.5, arrowsize=0.6)
+            along = (np.where(inside, np.nan, wind[..., k]) for k in (0, 1))
+            axes.streamplot(x[0], y[:, 0], *along, color="white", linewidth=0.5, arrowsize=0.6)
             for hub in places:
                 axes.plot(hub[0] + np.cos(turn), hub[1] + np.sin(turn), color="black", linewidth=1)
             axes.set(xlabel="aft, x/R", ylabel="to starboard, y/R", aspect="equal", title=NAMES[name])
