@@ -192,7 +192,7 @@ def _(model: SeveralWakes, start: "SolvedTogether | None" = None, **settings: An
 def _warn_of(found: "Solution | SeveralSolution") -> None:
     """Warn where surfaces leak."""
     if (words := told(found.leak)) is not None:
-        warnings.warn(words, stacklevel=5)
+        warnings.warn(words, stacklevel=4)
 
 
 def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) -> Float[Array, "N 3"]:
