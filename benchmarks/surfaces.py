@@ -161,7 +161,7 @@ def cost(quick: bool) -> dict:
     rows = []
     rng = np.random.default_rng(0)
     for targets in (1000, 10_000) if quick else (1000, 10_000, 100_000):
-        for panel in (0.8, 0.4, 0.2):
+        for panel in (0.8, 0.4, 0.2, 0.025):
             corners = rj.box((-2, -2, -1), (2, 2, 1), panel).corners
             points = jnp.asarray(rng.uniform(-3, 3, (targets, 3)))
             density = jnp.asarray(rng.normal(size=len(corners)))
