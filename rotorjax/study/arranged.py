@@ -233,8 +233,8 @@ def draw_outwash(found: Arranged) -> Figure:
         for i, (name, wind) in enumerate(winds.items()):
             axes = figure.add_subplot(1, 2, i + 1, facecolor="#7a5c3e")
             filled = axes.contourf(x, y, speeds[name], levels=levels, cmap="viridis", extend="max")
-            along = (np.where(inside, np.nan, wind[..., k]) for k in (0, 1))
-            axes.streamplot(x[0], y[:, 0], *along, color="white", linewidth=0.5, arrowsize=0.6)
+            u, v = (np.where(inside, np.nan, wind[..., k]) for k in (0, 1))
+            axes.streamplot(x[0], y[:, 0], u, v, color="white", linewidth=0.5, arrowsize=0.6)
             for hub in places:
                 axes.plot(hub[0] + np.cos(turn), hub[1] + np.sin(turn), color="black", linewidth=1)
             axes.set(xlabel="aft, x/R", ylabel="to starboard, y/R", aspect="equal", title=NAMES[name])

@@ -80,8 +80,8 @@ def test_a_patch_of_the_ground_disks_size_is_the_ground_of_the_models_own_source
     """Both close the footprint alone: panels of constant density tend to the modes with their number."""
     own = unit_states(model(GROUND, wake=None, ground_radius=1.0)).up
     off = [jnp.abs(units(model(None, round_patch(rings), wake=None))[0].up - own) for rings in (6, 12)]
-    assert float(jnp.max(off[1][:2])) < 0.3 * float(jnp.max(off[0][:2])), off
-    assert bool(jnp.all(off[1] < 0.015 * own[0])), (off, own)
+    assert float(off[1][0]) < 0.3 * float(off[0][0]), off
+    assert bool(jnp.all(off[1] < 0.002 * own[0])), (off, own)
 
 
 def test_no_air_goes_through_a_panels_middle():
@@ -153,20 +153,22 @@ def test_a_house_far_away_changes_nothing():
 
 
 def test_derivatives_by_the_place_of_surfaces():
-    """Compiled, many at once and in reverse, against differences: of a wall and of a deck whose shadow moves."""
+    """Compiled and in reverse, against differences: of a wall and of a deck whose shadow moves."""
     both = HANGAR + rj.slab((-3.0, -1.0), (0.3, 0.5), -0.5, 0.3, panel=0.8)
-    among = finite_state_model(GROUND, 0, 1, 1, 2, surfaces=both, wake=None)
+    among = finite_state_model(None, 0, 1, 0, 1, surfaces=both, wake=None)
     way = jnp.array([0.8, 0.5, 0.3])
 
+    @jax.jit
+    @jax.value_and_grad
     def inflow(by):
         solid = eqx.tree_at(lambda s: s.panels, among.surfaces, among.surfaces.panels.moved(by * way))
-        here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, GROUND))
+        here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, None))
         return unit_inflow(here, unit_states(here), X, Y)[0] @ (X + Y)
 
     step = 1e-5
-    value, slope = jax.jit(jax.vmap(jax.value_and_grad(inflow)))(0.02 + step * jnp.array([-1, 0, 1]))
-    assert abs(float(slope[1])) > 1e-3
-    np.testing.assert_allclose(slope[1], (value[2] - value[0]) / (2 * step), rtol=1e-6)
+    values, (_, slope, _) = zip(*(inflow(0.02 + by) for by in (-step, 0.0, step)), strict=True)
+    assert abs(float(slope)) > 1e-3
+    np.testing.assert_allclose(slope, (values[2] - values[0]) / (2 * step), rtol=1e-6)
 
 
 def test_a_rotors_thrust_rises_as_a_roof_comes_under_it():

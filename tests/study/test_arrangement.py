@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from wakes import made_up
 
+import rotorjax as rj
 from rotorjax.cli import main
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 from rotorjax.study.arranged import solve_arrangement
-from rotorjax.study.arrangement import read_arrangement
+from rotorjax.study.arrangement import SCHEMA, Arrangement, read_arrangement
 from rotorjax.wake.several_solution import SeveralSolution
 
 CASE = """[rotors]
@@ -52,7 +53,7 @@ def test_a_case_is_rotors_ground_and_surfaces(tmp_path):
     assert case.senses.tolist() == [1, -1]
     assert float(case.ground.height) == 1
     assert (case.settings.wake.panels, float(case.settings.wake.tip_core)) == (6, 0.05)
-    assert len(case.surfaces) > len(read(tmp_path, CASE).surfaces)
+    assert len(case.surfaces) == len(rj.wall(3.0, -1.0, 0.0, length=2.0, panel=1.0) + rj.slab((-3, 2), (-2, 3), -0.5))
     assert (case.wakes.slices, len(case.wakes)) == (8, 2)
     one = read(tmp_path, "[rotors]\nx = [0.0]\ny = [0.0]\n")
     assert (one.wakes.slices, one.surfaces, one.ground) == (1, None, None)
@@ -78,6 +79,16 @@ def test_what_is_not_right_is_one_line_in_the_files_own_words(tmp_path, old, new
         read(tmp_path, CASE.replace(old, new, 1))
     assert str(caught.value).startswith(str(tmp_path / "pair.toml"))
     assert "\n" not in str(caught.value)
+
+
+def test_the_template_shows_every_key_and_is_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(Arrangement, "wakes", None)  # no matrix of panels to invert
+    assert main(["new", "several", str(tmp_path / "mine")]) == 0
+    case = read_arrangement(tmp_path / "mine" / "case.toml")
+    assert (len(case.places), len(case.surfaces), float(case.ground.height)) == (2, 224, 1)
+    text = (tmp_path / "mine" / "case.toml").read_text()
+    keys = {key for table, of_table in SCHEMA.items() if table != "wake" for key in (table, *of_table)}
+    assert not [key for key in keys if key not in text]
 
 
 def alike(several, start=None, progress=None):
