@@ -85,7 +85,7 @@ def test_the_template_shows_every_key_and_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(Arrangement, "wakes", None)  # no matrix of panels to invert
     assert main(["new", "several", str(tmp_path / "mine")]) == 0
     case = read_arrangement(tmp_path / "mine" / "case.toml")
-    assert (len(case.places), len(case.surfaces), float(case.ground.height)) == (2, 224, 1)
+    assert (len(case.places), len(case.surfaces), float(case.ground.height)) == (2, 208, 1)
     text = (tmp_path / "mine" / "case.toml").read_text()
     keys = {key for table, of_table in SCHEMA.items() if table != "wake" for key in (table, *of_table)}
     assert not [key for key in keys if key not in text]
