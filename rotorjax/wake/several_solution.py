@@ -70,12 +70,20 @@ class SeveralSolution:
         """Ideal power of the rotors, each on its own disk, over what they take: Σ C_T^1.5/√2 / Σ C_P."""
         return np.sum(self.CT**1.5) / np.sqrt(2) / np.sum(self.CP)
 
+    @property
+    def leak(self) -> float | None:
+        """Share of what blows on the surfaces that goes through between their panels' middles (`panels.surface.leak`);
+        None without any.
+        """
+        return None if self.model.surfaces is None else float(_leaked(self.model, self.state))
+
     def velocity(self, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
         """Induced velocity over ΩR at points of the common frame over R, mean over the blades' passage."""
         return _velocity(self.model, self.state, jnp.asarray(points, float))
 
 
 _velocity = eqx.filter_jit(flow.velocity)
+_leaked = eqx.filter_jit(flow.leaked)
 
 
 class EachInverse(eqx.Module):
