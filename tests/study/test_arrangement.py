@@ -15,6 +15,7 @@ from rotorjax.io import netcdf
 from rotorjax.study.arranged import solve_arrangement
 from rotorjax.study.arrangement import SCHEMA, Arrangement, read_arrangement
 from rotorjax.wake.several_solution import SeveralSolution
+from tests.browser import opens
 
 CASE = """[rotors]
 rotor = "knight_hefner_2"
@@ -109,6 +110,7 @@ def test_both_models_are_written_and_symmetric(tmp_path, monkeypatch):
     assert main(["study", "--quick", "--config", str(tmp_path / "pair.toml"), "--out", str(out)]) == 0
     names = {"maps.nc", "maps.png", "outwash.png", "summary.json", "report.md", "report.html"}
     assert {p.name for p in out.iterdir()} == names
+    assert opens(out / "report.html", tmp_path)
     maps = netcdf.read(out / "maps.nc").vpbfsm_inflow.to_numpy()
     np.testing.assert_allclose(maps[0], maps[1], atol=1e-12)  # each in its own sense
     assert np.ptp(maps[0].mean(axis=1)) > 1e-5  # the other rotor's ground sources
