@@ -35,10 +35,10 @@ def streamlines(found: Solution) -> Float[np.ndarray, "L N 3"]:
     """
     psi = 2 * np.pi / AROUND * np.arange(AROUND)
     alike = found.state.near.shape[0] == 1
-    start = np.array([[r, 0.0, ABOVE] for r in RADII])
-    begun = start if alike else np.concatenate([rotate_about_shaft(start, angle) for angle in psi])
-    lines = np.asarray(_along(found, jnp.asarray(begun))).swapaxes(0, 1)
-    return np.concatenate([rotate_about_shaft(lines, angle) for angle in psi]) if alike else lines
+    start = jnp.array([[r, 0.0, ABOVE] for r in RADII])
+    begun = start if alike else jnp.concatenate([rotate_about_shaft(start, angle) for angle in psi])
+    lines = _along(found, begun).swapaxes(0, 1)
+    return np.asarray(jnp.concatenate([rotate_about_shaft(lines, angle) for angle in psi]) if alike else lines)
 
 
 @eqx.filter_jit
