@@ -163,11 +163,11 @@ def test_derivatives_by_the_place_of_surfaces():
     def inflow(by):
         solid = eqx.tree_at(lambda s: s.panels, among.surfaces, among.surfaces.panels.moved(by * way))
         here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, None))
-        return unit_inflow(here, unit_states(here), X, Y)[0] @ (X + Y)
+        return jnp.sum(unit_inflow(here, unit_states(here), X, Y)[0])
 
     step = 1e-5
     values, (_, slope, _) = zip(*(inflow(0.02 + by) for by in (-step, 0.0, step)), strict=True)
-    assert abs(float(slope)) > 1e-4
+    assert abs(float(slope)) > 0.1
     np.testing.assert_allclose(slope, (values[2] - values[0]) / (2 * step), rtol=1e-6)
 
 
