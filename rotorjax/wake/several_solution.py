@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.checks import known
 from rotorjax.errors import InputError
-from rotorjax.ode.continuation import continuation
+from rotorjax.ode.continuation import Steps, continuation
 from rotorjax.ode.implicit import attach
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
@@ -142,7 +142,7 @@ def _by_shares(
         spent += found.iterations
         return found
 
-    branch = continuation(step, x, 0.0, 1.0, step=0.5, largest=1.0, smallest=0.03, easy=5, jump=0.3)
+    branch = continuation(step, x, 0.0, 1.0, steps=Steps(0.5, 0.03, 1.0, easy=5), jump=0.3)
     if not branch.outcomes:
         assert branch.failed is not None
         return _read(_share(several, 0.0), replace(branch.failed, why=branch.why), spent)
