@@ -82,6 +82,7 @@ def _arranged(chosen: argparse.Namespace) -> int:
     from rotorjax.study.arranged import solve_arrangement, write_arranged
     from rotorjax.study.arrangement import read_arrangement
 
+    chosen.kept = ""  # if it is interrupted
     beside = {"rigid": chosen.rigid, "collective": chosen.collective is not None}
     beside |= {name: getattr(chosen, name) is not None for name in ("heights", "slopes", "calibration")}
     if given := [name for name, there in beside.items() if there]:

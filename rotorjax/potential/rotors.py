@@ -167,9 +167,11 @@ def _under(ground: Plane, place: Float[Array, "3"]) -> Plane:
 
 
 def _own(model: FiniteStateModel, place: Array, frame: Array, ground: Plane | None, surfaces: Solid | None):
-    """One rotor's model alone, over the ground and beside the surfaces that it sees."""
+    """One rotor's model alone, over the ground and beside the surfaces that it sees; there its wake keeps its edge."""
     seen = None if ground is None else _under(ground, place)
-    return replace(model, ground=seen, surfaces=None if surfaces is None else _seen(surfaces, place, frame))
+    if surfaces is None:
+        return replace(model, ground=seen)
+    return replace(model, ground=seen, surfaces=_seen(surfaces, place, frame), wake_edge="rigid")
 
 
 def _seen(surfaces: Solid, place: Float[Array, "3"], frame: Float[Array, "3 3"]) -> Solid:

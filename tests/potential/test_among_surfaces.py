@@ -145,7 +145,7 @@ def test_a_house_to_port_is_one_to_starboard_in_a_mirror():
 
 
 def test_a_house_far_away_changes_nothing():
-    alone, beside = model(GROUND), model(GROUND, HOUSE.moved((0.0, 30.0, 0.0)))
+    alone, beside = model(GROUND, wake_edge="rigid"), model(GROUND, HOUSE.moved((0.0, 30.0, 0.0)))
     points = model(GROUND, HOUSE).surfaces.panels.middles
     (_, inflow, there), (_, own, own_there) = (flow(m, TAU, points) for m in (beside, alone))
     np.testing.assert_allclose(inflow, own, atol=1e-6)
@@ -163,11 +163,11 @@ def test_derivatives_by_the_place_of_surfaces():
     def inflow(by):
         solid = eqx.tree_at(lambda s: s.panels, among.surfaces, among.surfaces.panels.moved(by * way))
         here = eqx.tree_at(lambda m: m.surfaces, among, refitted(solid, None))
-        return unit_inflow(here, unit_states(here), X, Y)[0] @ (X + Y)
+        return jnp.sum(unit_inflow(here, unit_states(here), X, Y)[0])
 
     step = 1e-5
     values, (_, slope, _) = zip(*(inflow(0.02 + by) for by in (-step, 0.0, step)), strict=True)
-    assert abs(float(slope)) > 1e-4
+    assert abs(float(slope)) > 0.1
     np.testing.assert_allclose(slope, (values[2] - values[0]) / (2 * step), rtol=1e-6)
 
 

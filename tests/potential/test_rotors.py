@@ -6,8 +6,8 @@ import pytest
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.potential.ground_source import DiskQuadrature
-from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
-from rotorjax.potential.rotors import inflows, mean_inflows, rates, rotors, steady, velocity
+from rotorjax.potential.model import finite_state_model, inflow, mean_inflow, steady_state
+from rotorjax.potential.rotors import inflow_at, inflows, mean_inflows, rates, rotors, steady, velocity
 
 CT = 0.006
 V0 = np.sqrt(CT / 2)
@@ -103,7 +103,10 @@ def test_one_rotor_over_ground_is_the_steady_model(choices, tolerance):
     size = SIZE if choices else SIZE | {"quadrature": DiskQuadrature(20, 16)}  # a contracting wake asks for more nodes
     model = finite_state_model(ground, ground_harmonics=1, **size, **choices)
     system, a = solve([(0, 0, 0.2)], model, ground=plane(1.0))
-    np.testing.assert_allclose(mean_inflows(a, system)[0], mean_inflow(steady_state(model, TAU), model), rtol=tolerance)
+    state = steady_state(model, TAU)
+    np.testing.assert_allclose(mean_inflows(a, system)[0], mean_inflow(state, model), rtol=tolerance)
+    r, psi = jnp.array([0.3, 0.7, 0.95]), jnp.array([0.0, 2.0])
+    np.testing.assert_allclose(inflow_at(a, r, psi, system)[0], inflow(state, r, psi, model), rtol=tolerance)
 
 
 def test_rates_vanish_in_steady_state_and_differentiate():
