@@ -11,9 +11,10 @@ Prints, for each inflow and flight:
 5. with --wake, the free wake at μ = .15: seconds of each stage from the trim on (compilation in the first of each),
    peak memory, the errors of 2 and 3, those of the condensed model, and the leading exponents.
 6. with --table, an inflow identified over μ and h from the linear free wake (coarse wakes), its error over a revolution
-   beside Pitt and Peters' own, and at a flight held out; and there the matrices between those of two other flights.
+   beside Pitt and Peters' own, and at flights held out, at a μ and at a height of their own; and at the first of these
+   the matrices between those of two other flights.
 
-    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--table] [--json FILE]
+    python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--table DIR] [--json FILE]
 """
 
 import argparse
@@ -21,20 +22,24 @@ import json
 import resource
 import time
 from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import numpy as np
 
-from rotorjax.linearisation import flight, identified, rotor, steps, wake_flight
+from rotorjax.io.atomic import make_folder
+from rotorjax.linearisation import flight, identified, identify, rotor, steps, wake_flight
 from rotorjax.linearisation.compact import compact, frequencies
-from rotorjax.linearisation.condensed import aligned
+from rotorjax.linearisation.condensed import Condensed, aligned
 from rotorjax.linearisation.found import CONTROLS, OUTPUTS, Wanted
 from rotorjax.linearisation.modes import modes
 from rotorjax.linearisation.sensitivity import sensitivity
 from rotorjax.ode.harmonic import average
 from rotorjax.ode.hill import harmonic_transfer
-from rotorjax.trim.run import request, run
+from rotorjax.trim.in_wake import TrimmedInWake
+from rotorjax.trim.run import Request, request, run
 from rotorjax.trim.solve import trim
 from rotorjax.wake.settings import flight_settings
 
@@ -48,7 +53,19 @@ PARAMETERS = {
     "hinge offset": (lambda design: design[1].blade.offset, 1e-5),
     "density over inertia": (lambda design: design[1].blade.air, 1e-4),
     "thrust": (lambda design: design[0].thrust, 1e-7),
+    "twist": (lambda design: design[1].rotor.twist.values, 1e-5),
+    "height": (lambda design: design[0].height, 1e-5),
 }
+"""Where each stands in flight and rotor, and the differences' step. Twist: linear, rad over R."""
+
+
+class InWake(NamedTuple):
+    """A flight in a coarse wake. small, truth: condensed model, and unit steps of that of all states."""
+
+    request: Request
+    trimmed: TrimmedInWake
+    small: Condensed
+    truth: np.ndarray
 
 
 def timed(call):
@@ -122,57 +139,58 @@ def wake_row(order):
 
 
 def in_wake(advance, height, near):
-    """Trim, condensed model, basis and unit steps of a flight in a coarse free wake, from a flight nearby."""
+    """Request, trim, condensed model and unit steps of a flight in a coarse free wake, from a flight nearby."""
     wanted = request("uh60", THRUST, "freewake", advance=advance, height=height)
-    result = run(replace(wanted, wake=flight_settings(4, **COARSE)), near and near[0].trimmed)
+    wanted = replace(wanted, wake=flight_settings(4, **COARSE))
+    result = run(wanted, near and near.trimmed)
+    if not result.converged:
+        raise SystemExit(f"coarse wake at μ = {advance:g}, h = {height}: {result.trimmed.outcome.why}")
     base = wake_flight.base_in_flight(rotor.base_of(result.trimmed), rotor.AZIMUTHS)
     model = wake_flight.all_states(base, identified.INPUTS, (*identified.OUTPUTS, "lambda_0"))
-    small, truth = wake_flight.condense(model, base, near and near[1].model)
-    return result, small, truth
+    return InWake(wanted, result.trimmed, *wake_flight.condense(model, base, near and near.small.model))
 
 
-def table_rows(speeds, heights, held):
-    """Errors of an inflow identified over a grid, in it and at a flight held out, beside Pitt and Peters' own."""
+def table_rows(speeds, heights, held, folder):
+    """Errors of an inflow identified over a grid, in it and at flights held out, beside Pitt and Peters' own."""
     found, flown, near = [], {}, None
     for height in heights:
         for advance in speeds:
             near, took = timed(lambda mu=advance, h=height, n=near: in_wake(mu, h, n))
             flown[advance, height] = near
-            found.append(identified.identified(*with_pitt_peters(near[1], advance, height), advance, height or np.inf))
-            print(
-                f"identified at μ = {advance:g}, h = {height or np.inf:g}: error {100 * found[-1].error:.1f} %, "
-                f"Pitt and Peters {100 * found[-1].pitt_peters_error:.1f} %; {took:.0f} s",
-                flush=True,
-            )
+            found.append(identify.fitted(average(near.small.model), near.request))
+            print(f"{identify.lines(found[-1:])[0]}; {took:.0f} s", flush=True)
+    identify.write(found, folder)
     data = identified.table(found)
     print(identified.text(data))
-    advance, height = held
-    there = in_wake(advance, height, near)
-    model, linear, start = with_pitt_peters(there[1], advance, height)
-    target = identified.target_of(model, linear)
-    between = identified.interpolated(data, advance, height or np.inf)
-    errors = [identified.error_of(inflow, start, target, linear) for inflow in (between, start)]
-    print(f"held out μ = {advance:g}, h = {height or np.inf:g}: {100 * errors[0]:.1f} %, Pitt and Peters' own", end=" ")
-    print(f"{100 * errors[1]:.1f} %")
-    return {"text": identified.text(data), "held_out": held, "error": errors[0], "pitt_peters_error": errors[1]} | (
-        matrices_between([flown[speed, height] for speed in speeds if (speed, height) in flown], there)
+    there = {place: in_wake(*place, near) for place in held}
+    rows = [held_out(data, one) for one in there.values()]
+    ends = [flown[speed, held[0][1]] for speed in speeds if (speed, held[0][1]) in flown]
+    return {"text": identified.text(data), "held_out": rows} | matrices_between(ends, there[held[0]])
+
+
+def held_out(data, flown):
+    """Error at a flight that a table has not seen, of what is interpolated in it and of Pitt and Peters' own."""
+    advance, height = flown.request.advance, flown.request.height or np.inf
+    start = identify.beside(flown.request)
+    target = identified.target_of(average(flown.small.model), start.rotor)
+    between = identified.interpolated(data, advance, height)
+    error, own = (identified.error_of(inflow, start.inflow, target, start.rotor) for inflow in (between, start.inflow))
+    print(
+        f"held out μ = {advance:g}, h = {height:g}: {100 * error:.1f} %, Pitt and Peters' own {100 * own:.1f} %: "
+        f"{error / own:.2f} of it",
+        flush=True,
     )
-
-
-def with_pitt_peters(small, advance, height):
-    """The mean model of a wake, that of the same flight with Pitt and Peters' inflow, and that inflow's own."""
-    trimmed = run(request("uh60", THRUST, "pitt-peters", advance=advance, height=height)).trimmed
-    return average(small.model), average(rotor.linear_rotor(rotor.base_of(trimmed))), identified.own(trimmed)
+    return {"advance_ratio": advance, "height": height, "error": error, "pitt_peters_error": own}
 
 
 def matrices_between(ends, there):
     """Error of steps by matrices half way between those of the first and last flight, beside the condensed model's."""
     if len(ends) < 2:
         return {}
-    one, two = aligned([ends[0][1], ends[-1][1]])
+    one, two = aligned([ends[0].small, ends[-1].small])
     middle = replace(one, **{name: (getattr(one, name) + getattr(two, name)) / 2 for name in "abcd"})
-    truth, errors = there[2], {}
-    for name, model in (("condensed", there[1].model), ("between", middle), ("first", one)):
+    truth, errors = there.truth, {}
+    for name, model in (("condensed", there.small.model), ("between", middle), ("first", one)):
         own = np.stack([model.step(column)[1] for column in np.eye(len(model.inputs))], axis=-1)
         gap = steps.largest_gap(truth, own)
         errors[name] = {"median": float(np.median(gap)), "CT/theta_0": float(gap[0, 0])}
@@ -182,13 +200,15 @@ def matrices_between(ends, there):
 
 def derivatives(trimmed):
     """Largest gap of the exponents' derivatives from central differences, over the largest derivative."""
-    gaps = {}
+    gaps, design = {}, (trimmed.flight, trimmed.p)
     for name, (where, step) in PARAMETERS.items():
-        found, ends = sensitivity(trimmed, where), []
-        for change in (step, -step):
-            design = (trimmed.flight, trimmed.p)
+        if where(design) is None:
+            continue
+        way = trimmed.p.rotor.twist.stations if name == "twist" else np.ones(())
+        found, ends = sensitivity(trimmed, where, way=way), []
+        for change in (step * way, -step * way):
             condition, p = eqx.tree_at(where, design, where(design) + change)
-            end = sensitivity(trim(p, condition, trimmed.residual, trimmed.z), where).exponents
+            end = sensitivity(trim(p, condition, trimmed.residual, trimmed.z), where, way=way).exponents
             ends.append(np.array([end[np.argmin(np.abs(end - v))] for v in found.exponents]))
         slopes = (ends[0] - ends[1]) / (2 * step)
         gaps[name] = float(np.abs(slopes - found.exponents_by).max() / np.abs(slopes).max())
@@ -197,10 +217,10 @@ def derivatives(trimmed):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--inflow", nargs="*", default=["pitt-peters"])
+    parser.add_argument("--inflow", nargs="*", default=["pitt-peters"], help="none: neither models nor derivatives")
     parser.add_argument("--order", type=int, default=20)
     parser.add_argument("--wake", action="store_true", help="the free wake in forward flight too, some minutes")
-    parser.add_argument("--table", action="store_true", help="an identified inflow over μ and h, some minutes")
+    parser.add_argument("--table", metavar="DIR", help="an identified inflow over μ and h, written there; some minutes")
     parser.add_argument("--json", help="file to write")
     chosen = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
@@ -217,13 +237,15 @@ def main():
             print("  reduced:", ", ".join(f"{k} {v:.2f} dB {one['gap_deg'][k]:.1f}°" for k, v in one["gap_db"].items()))
             for text, key in (("main", "step_error_main"), ("all", "step_error_all")):
                 print(f"  steps, {text}:", ", ".join(f"{k} {100 * v:.2f} %" for k, v in one[key].items()))
-            if inflow == "pitt-peters" and name in ("hover", "μ = .15"):
+            if inflow == "pitt-peters" and name in ("h = 1", "μ = .15"):
                 found[name] = derivatives(result.trimmed)
                 print("  derivatives:", ", ".join(f"{k} {v:.0e}" for k, v in found[name].items()), flush=True)
     if chosen.wake:
         rows.append(wake_row(chosen.order))
         print(json.dumps(rows[-1], indent=1, ensure_ascii=False))
-    table = table_rows((0.1, 0.2), (None, 1.0), (0.15, None)) if chosen.table else {}
+    table = {}
+    if chosen.table:
+        table = table_rows((0.1, 0.2), (None, 2.0, 1.0), ((0.15, None), (0.15, 1.4)), make_folder(Path(chosen.table)))
     if chosen.json:
         with open(chosen.json, "w") as file:
             json.dump({"flights": rows, "derivatives": found, "identified": table}, file, indent=1)

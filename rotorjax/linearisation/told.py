@@ -65,7 +65,7 @@ def mode_content(mode: Mode) -> dict[str, Any]:
     }
 
 
-def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio") -> Figure:
+def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
     """Exponents in the plane; of several flights each mode is a line from the first (open) to the last."""
     paths: dict[str, list[complex]] = {}
     for modes in by_value.values():
@@ -78,7 +78,7 @@ def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio")
         for (name, values), colour in zip(paths.items(), series_colours(len(paths)), strict=True):
             axes.plot(np.real(values), np.imag(values), "-", color=colour, lw=1, marker="o", label=name)
             axes.plot(np.real(values[0]), np.imag(values[0]), "o", color=colour, mfc="white")
-        span = ", ".join(f"{value:g}" for value in by_value)
-        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=f"{label} {span}")
+        title = f"{label} {', '.join(f'{value:g}' for value in by_value)}" + (f", {where}" if where else "")
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=title)
         axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
