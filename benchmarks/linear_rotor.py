@@ -5,11 +5,14 @@ Prints, for each inflow and flight:
 2. the reduced model against the periodic one's harmonic-0 transfer function up to 2/rev, dB and degrees, for θ₀ → C_T,
    θ₁c → β₁s, w → C_T and q → M;
 3. the periodic model against the nonlinear march over a revolution, steps of θ₀, θ₁c, w, q and height, in % of the
-   response's largest value: worst over C_T, L, M, blades' flap and inflow, and over every output;
+   response's largest value: worst over C_T, L, M, blades' flap and inflow, and over every output; this again with a
+   straight lag damper, for torque and forces in the disk's plane after a step cross kinks of its table;
 4. exponents by design parameters against central differences, relative to the largest.
 
-5. with --wake, the free wake at μ = .15: seconds of each stage from the trim on (compilation in the first of each),
-   peak memory, the errors of 2 and 3, those of the condensed model, and the leading exponents.
+5. with --wake, the free wake at μ = .15: seconds of each stage from the trim on (compilation in the first of each), of
+   the linearisation without compiling (from the first azimuth to the last), peak memory, the errors of 2 and 3, those
+   of the condensed model, the leading exponents, and errors of torque and forces in the disk's plane with the damper's
+   table and with a straight damper;
 6. with --table, an inflow identified over μ and h from the linear free wake (coarse wakes), its error over a revolution
    beside Pitt and Peters' own, and at flights held out, at a μ and at a height of their own; and at the first of these
    the matrices between those of two other flights.
@@ -38,6 +41,7 @@ from rotorjax.linearisation.modes import modes
 from rotorjax.linearisation.sensitivity import sensitivity
 from rotorjax.ode.harmonic import average
 from rotorjax.ode.hill import harmonic_transfer
+from rotorjax.ode.runge_kutta import RK4
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.run import Request, request, run
 from rotorjax.trim.solve import trim
@@ -48,6 +52,7 @@ FLIGHTS = {"hover": {}, "h = 1": {"height": 1.0}, "μ = .15": {"advance": 0.15},
 STEPPED = ("theta_0", "theta_1c", "w", "q")
 PAIRS = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"))
 MAIN = ("CT", "L", "M", "beta_0", "beta_1c", "beta_1s", "lambda_0", "lambda_1c", "lambda_1s")
+INPLANE = ("CQ", "X", "Y")
 COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0}
 PARAMETERS = {
     "hinge offset": (lambda design: design[1].blade.offset, 1e-5),
@@ -86,10 +91,10 @@ def row(inflow, name, order):
     small, reduce_s = timed(lambda: compact(average(model), order, truth))
     where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
     names = STEPPED + (("height",) if result.request.height else ())
-    stepped = rotor.linear_rotor(base, names, OUTPUTS)
-    sizes = [steps.size_of(n) for n in names]
-    error = steps.largest_gap(steps.marched(base, names, stepped.outputs), steps.modelled(stepped, sizes))
-    main = [stepped.outputs.index(n) for n in MAIN]
+    error, main = stepped(base, names), [OUTPUTS.index(n) for n in MAIN]
+    trimmed = result.trimmed
+    smooth = trim(straight_damper(trimmed.p), trimmed.flight, trimmed.residual, trimmed.z)
+    without = stepped(rotor.base_of(smooth), names)
     return result, {
         "inflow": inflow,
         "flight": name,
@@ -106,29 +111,67 @@ def row(inflow, name, order):
         "gap_deg": {k: float(small.gap_deg[v]) for k, v in where.items()},
         "step_error_main": {n: float(error[main, m].max()) for m, n in enumerate(names)},
         "step_error_all": {n: float(error[:, m].max()) for m, n in enumerate(names)},
-        "worst_step": {n: stepped.outputs[int(np.argmax(error[:, m]))] for m, n in enumerate(names)},
+        "worst_step": {n: OUTPUTS[int(np.argmax(error[:, m]))] for m, n in enumerate(names)},
+        "step_error_straight_damper": {n: float(without[:, m].max()) for m, n in enumerate(names)},
         "modes": {m.name: [m.exponent.real, m.exponent.imag] for m in found},
     }
 
 
+def stepped(base, names):
+    """Errors (q, m) of the linear model's steps, over every output."""
+    model = rotor.linear_rotor(base, names, OUTPUTS)
+    by_model = steps.modelled(model, [steps.size_of(name) for name in names])
+    return steps.largest_gap(steps.marched(base, names, OUTPUTS), by_model)
+
+
+def straight_damper(p):
+    """The rotor with a lag damper without kinks: one line from end to end of its table."""
+    blade = p.blade
+    line = blade.damper_rate * blade.damper_force[-1] / blade.damper_rate[-1]
+    return eqx.tree_at(lambda q: q.blade.damper_force, p, line)
+
+
+def wake_without_kinks(trimmed):
+    """Errors (q, m) of the free wake's linear steps with a straight damper, about a periodic march of its own."""
+    base = rotor.base_of(trimmed)
+    base = wake_flight.base_in_flight(base._replace(p=straight_damper(base.p)), rotor.AZIMUTHS)
+    model = wake_flight.all_states(base, CONTROLS, OUTPUTS)
+    unit = model.step(base.p.rotor.blades) * np.array([steps.size_of(name) for name in CONTROLS])
+    marched = steps.marched(base, CONTROLS, OUTPUTS, base.p.rotor.blades * model.steps, 1, RK4)
+    return steps.largest_gap(marched, unit)
+
+
 def wake_row(order):
     """The free wake in forward flight."""
-    found = flight.linearise_trim(request("uh60", THRUST, "freewake", advance=0.15), Wanted(order=order))
+    passed = []
+
+    def progress(stage, _):
+        if stage.startswith("linearisation "):
+            passed.append(time.perf_counter())
+
+    found = flight.linearise_trim(request("uh60", THRUST, "freewake", advance=0.15), Wanted(order=order), progress)
     if not isinstance(found, flight.LinearFlight):
         raise SystemExit(f"freewake, μ = .15: {found.trimmed.outcome.why}")
     model, wake = found.periodic, found.wake
     where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
     main, ins = [model.outputs.index(n) for n in MAIN], [model.inputs.index(n) for n in STEPPED]
+    rest = {"damper's table": wake.step_error, "straight damper": wake_without_kinks(found.result.trimmed)}
+    inplane = [model.outputs.index(n) for n in INPLANE]
     return {
         "inflow": "freewake",
         "flight": "μ = .15",
         "states": wake.states,
         "azimuths": wake.azimuths,
         "stages_s": found.seconds,
+        "linearised_compiled_s": (passed[-1] - passed[0]) * len(passed) / (len(passed) - 1),
         "peak_GB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6,
         "gap_db": {k: float(found.small.gap_db[v]) for k, v in where.items()},
         "gap_deg": {k: float(found.small.gap_deg[v]) for k, v in where.items()},
         "step_error_main": {n: float(wake.step_error[main, m].max()) for n, m in zip(STEPPED, ins, strict=True)},
+        "step_error_inplane": {
+            damper: {n: [float(v) for v in error[inplane, m]] for n, m in zip(STEPPED, ins, strict=True)}
+            for damper, error in rest.items()
+        },
         "step_error_median": float(np.median(wake.step_error)),
         "condensed_error_main": {
             n: float(wake.condensed_error[main, m].max()) for n, m in zip(STEPPED, ins, strict=True)
@@ -235,7 +278,11 @@ def main():
                 f"{one['reduce_s']:.2f} s, {one['unstable']} unstable"
             )
             print("  reduced:", ", ".join(f"{k} {v:.2f} dB {one['gap_deg'][k]:.1f}°" for k, v in one["gap_db"].items()))
-            for text, key in (("main", "step_error_main"), ("all", "step_error_all")):
+            for text, key in (
+                ("main", "step_error_main"),
+                ("all", "step_error_all"),
+                ("all, straight lag damper", "step_error_straight_damper"),
+            ):
                 print(f"  steps, {text}:", ", ".join(f"{k} {100 * v:.2f} %" for k, v in one[key].items()))
             if inflow == "pitt-peters" and name in ("h = 1", "μ = .15"):
                 found[name] = derivatives(result.trimmed)
