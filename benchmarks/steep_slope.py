@@ -60,9 +60,7 @@ def branch(quick: bool, points: int) -> tuple[FreeWake, Branch]:
     assert search.inverse is not None
     linear = Krylov(forcing=0.03, precondition=Inverse(search.inverse), restart=200, restarts=1)
     model = found.model
-    followed = follow(
-        over, *ends[-2:], model, points=points, easy=4, linear=linear, tol=1e-6, max_iterations=10, progress=True
-    )
+    followed = follow(over, *ends[-2:], model, points=points, linear=linear, tol=1e-6, max_iterations=10, progress=True)
     return model, followed
 
 

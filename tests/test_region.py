@@ -25,7 +25,7 @@ TAU = jnp.zeros(9).at[:3].set(jnp.array([np.sqrt(3) / 4 * 0.006, 5e-4, 2e-4]))
 R, PSI = jnp.array([0.3, 0.6, 0.9]), jnp.array([0.0, 0.7, np.pi / 2, np.pi, 5.0])
 
 
-CYLINDER = {"wake": None, "slope": "sheared", "ground_in_mass_flow": False, "mass_flow": "paper"}
+CYLINDER = {"wake": None, "slope": "sheared", "ground_in_mass_flow": False, "mass_flow": "paper", "wake_edge": "rigid"}
 """A region cuts the sources: seen alone where nothing else, neither wake nor mass flow, knows of the ground."""
 
 

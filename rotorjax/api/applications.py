@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 from rotorjax.api.solved import Solved
+from rotorjax.checks import refuse
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
@@ -73,6 +74,11 @@ def linearise(
     from rotorjax.trim.solve import Trimmed
 
     inputs, outputs = (None if names is None else tuple(names) for names in (inputs, outputs))
+    if isinstance(about, Result) and about.request.surfaces is not None:
+        raise InputError(
+            "Argument `about` must be a trim without surfaces, but has some: step it by rj.march, or linearise the "
+            "wake of rigid blades among them (rj.solve of rj.free_wake)"
+        )
     if isinstance(about, Result) and not isinstance(about.trimmed, Trimmed) and not about.request.advance:
         model = _hovering(about, inputs, outputs, harmonics, order)
         return handed_over(model, about.request.rotor, about.request.operating, time)
@@ -100,7 +106,8 @@ def _periodic(
         return linear_wake(about.found, inputs, outputs), about.found.model
     if not isinstance(about, Result):
         raise InputError(
-            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, but is neither"
+            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, of one rotor, but is "
+            "neither"
         )
     if isinstance(about.trimmed, Trimmed):
         return linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
@@ -188,6 +195,10 @@ def march(
             raise InputError(f"Argument `{next(iter(options))}` is of a march of the rotor: a linear model has none")
         return linear_march(about, steps_per_turn)
     from rotorjax.simulation.march import march
+    from rotorjax.trim.run import Result
+
+    if not isinstance(about, Result):
+        raise refuse("about", "be a trim of one rotor (rj.trim) or its linear model", f"a {type(about).__name__}")
 
     return march(about, steps_per_turn, **options)
 

@@ -13,12 +13,11 @@ from rotorjax.inflow.balance import Stations, stations_of
 from rotorjax.operating import OperatingPoint, check_still
 from rotorjax.panels.surface import Panels, Solid
 from rotorjax.potential.model import FiniteStateModel, finite_state_model
+from rotorjax.potential.surfaces import IN_SHADOW
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
 
 SIZES = ("ground_harmonics", "ground_radial_terms")
-IN_SHADOW = (6, 5)
-"""Of the ground's sources beside surfaces: what the rim of a shadow on the ground needs."""
 
 
 class FiniteState(eqx.Module):

@@ -1,5 +1,6 @@
 """A rotor in its steady inflow, of either model: found by `solve`, read, drawn and written."""
 
+import warnings
 from functools import singledispatch
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,10 +12,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.api.models import FiniteState
+from rotorjax.checks import known
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
 from rotorjax.inflow.balance import Balance, balance
+from rotorjax.panels.surface import told
 from rotorjax.potential import model as potential
 from rotorjax.wake import field, sensitivity
 from rotorjax.wake.model import FreeWake
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from rotorjax.api.several import SolvedTogether
+    from rotorjax.wake.several_solution import SeveralSolution
 
 Number = Numbers = Any  # of numpy, or of jax under tracing
 
@@ -62,6 +66,11 @@ class Solved(eqx.Module):
     psi = property(lambda self: self.found.psi, doc="Azimuths in rad, (K,); one alone where nothing changes with it.")
     converged = property(lambda self: self.found.converged, doc="Whether this is the steady state that was asked for.")
     why = property(lambda self: self.found.why, doc="How the search ended, in words.")
+
+    @property
+    def leak(self) -> float | None:
+        """Share of what a free wake blows on surfaces that goes through between their panels' middles, else None."""
+        return self.found.leak if isinstance(self.found, Solution) else None
 
     def performance(self) -> Performance:
         """Thrust, torque and power in SI."""
@@ -139,7 +148,8 @@ def solve(model: FreeWake | FiniteState, start: Solved | None = None, **settings
     """Find the steady inflow of a rotor and what it does in it; of several rotors (`rj.several_wakes`) too.
 
     start: a solved neighbour that a free wake's search begins from. settings: of a free wake's search (`tol`,
-    `progress`). Works under jax.grad, jacfwd, vmap and jit (`wake.sensitivity.solve` says how a free wake does). Raises
+    `progress`). Warns where much of a wake goes through surfaces between their panels' middles (`Solved.leak`). Works
+    under jax.grad, jacfwd, vmap and jit (`wake.sensitivity.solve` says how a free wake does). Raises
     InputError where the finite-state model finds no loading that reproduces itself; a free wake that is not found comes
     back with `converged` False, under tracing it raises.
 
@@ -158,7 +168,10 @@ def _(model: FreeWake, start: Solved | None = None, **settings: Any) -> Solved:
     if start is not None and not isinstance(start.found, Solution):
         raise InputError("Argument `start` must be the solution of a free wake, but is of the finite-state model")
     near: Solution | None = None if start is None else start.found  # type: ignore[assignment]
-    return Solved(model, sensitivity.solve(model, near, **settings))
+    found = sensitivity.solve(model, near, **settings)
+    if known(found):
+        _warn_of(found)
+    return Solved(model, found)
 
 
 @solve.register
@@ -171,7 +184,15 @@ def _(model: SeveralWakes, start: "SolvedTogether | None" = None, **settings: An
     from rotorjax.api.several import SolvedTogether
     from rotorjax.wake.several_solution import solve_several
 
-    return SolvedTogether(solve_several(model, None if start is None else start.found, **settings))
+    found = solve_several(model, None if start is None else start.found, **settings)
+    _warn_of(found)
+    return SolvedTogether(found)
+
+
+def _warn_of(found: "Solution | SeveralSolution") -> None:
+    """Warn where surfaces leak."""
+    if (words := told(found.leak)) is not None:
+        warnings.warn(words, stacklevel=4)
 
 
 def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) -> Float[Array, "N 3"]:

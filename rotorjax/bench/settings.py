@@ -1,6 +1,7 @@
 """What a study computes: rotor, operating point and the settings of both models, with a fingerprint of them all."""
 
 import hashlib
+import inspect
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,21 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax import __version__
-from rotorjax.checks import check_number
+from rotorjax.checks import Range, check_number
 from rotorjax.errors import InputError
+from rotorjax.io.toml_file import Key
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.model import choices, finite_state_model
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
-from rotorjax.wake.settings import WakeSettings, hover_settings, quick_settings
+from rotorjax.wake.settings import WakeSettings, hover_settings, quick_settings, wake_settings
+
+WAKE_KEYS = {
+    name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
+    for name, parameter in inspect.signature(wake_settings).parameters.items()
+    if name not in ("inboard", "roll_up", "bound_filter", "pair_sums")
+}
+"""The free wake's settings as a case file's `[wake]` may hold them."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 What they stand for: how far the wake contracts (radius), how fast (length) and how near the ground keeps it from that
 (clearance); what the influence matrix makes of the mean and of the third pressure term (gains, within half of their
-values); and the share of a slope that the sources see, since the free wake runs downhill, and its inflow tilts less
-than that of a column that stays under the rotor.
+values); and the share of a slope that the sources see: what the free wake, which runs downhill, leaves of it beyond
+what a jet's edge does (`potential.wake_edge`).
 
 The corrections keep what the sources are solved for: no flow through the ground that they see.
 """

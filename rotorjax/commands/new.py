@@ -11,6 +11,7 @@ TRY = {
     "gust": "rotorjax simulate --case {0}/case.toml --out {0}/out",
     "freewake": "rotorjax simulate --case {0}/case.toml --out {0}/out",
     "sweep": "rotorjax sweep --case {0}/case.toml --out {0}/out --table {0}/out/table.txt",
+    "several": "rotorjax study --quick --config {0}/case.toml --out {0}/out",
     "deck": "rotorjax deck --case {0}/case.toml --out {0}/out",
 }
 
@@ -22,8 +23,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="a rotor or a case to begin with",
         description="Write a commented rotor file or case and say how to run it: rotor (three blades, every key), "
         "simulate (a step of collective close to the ground), gust, freewake (a step with the free wake), sweep "
-        "(heights and slopes), deck (a landing). Files that are there are not replaced. Without a folder a case is "
-        "printed.",
+        "(heights and slopes), several (two rotors beside a hangar), deck (a landing). Files that are there are not "
+        "replaced. Without a folder a case is printed.",
     )
     parser.add_argument("kind", choices=tuple(TRY), help="what to write")
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="where (none: to the screen)")

@@ -4,6 +4,10 @@ import argparse
 import sys
 import warnings
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rotorjax.simulation.pace import Pace
 
 
 def register(commands: argparse._SubParsersAction) -> None:
@@ -54,12 +58,20 @@ def run(chosen: argparse.Namespace) -> int:
             found = fly(case, bar.set_postfix_str, pace)
         bar.set_postfix_str("files")
         told = write_all(found, out, animated=chosen.gif)
+    _tell(told, out / "report.json", pace)
+    if not found.finished:
+        print(f"the march ended early: {found.why}")
+    return 0 if found.finished else 1
+
+
+def _tell(told: dict[str, Any], report: Path, pace: "Pace | None") -> None:
+    """Say what was flown, and how fast."""
     for name, row in told["histories"].items():
         print(f"{name:14s} " + "  ".join(f"{key} {row[key]:9.5f}" for key in ("first", "last", "min", "max")))
     print(
         f"{told['simulated_s']:.2f} s, {told['revolutions']:.1f} revolutions in {told['march_s']:.2f} s "
         f"({told['march_s_per_revolution']:.3f} s a revolution, {told['real_time_factor']:.2f} times real time): "
-        f"{out / 'report.json'}"
+        f"{report}"
     )
     if pace is not None:
         print(f"{pace.late} of {pace.frames} frames late, by up to {1e3 * pace.worst:.0f} ms")
@@ -71,9 +83,6 @@ def run(chosen: argparse.Namespace) -> int:
             f"note: {told['vortex_ring_s']:.2f} s in the vortex ring state, where no inflow model holds",
             file=sys.stderr,
         )
-    if not found.finished:
-        print(f"the march ended early: {found.why}")
-    return 0 if found.finished else 1
 
 
 def _warn(message: Warning | str, *_) -> None:

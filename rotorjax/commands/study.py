@@ -1,6 +1,7 @@
 """`rotorjax study`: the paper's evaluation with both models, as figures, data and a report."""
 
 import argparse
+import sys
 import time
 from pathlib import Path
 
@@ -17,6 +18,12 @@ def register(commands: argparse._SubParsersAction) -> None:
         "not converge.",
     )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
+    parser.add_argument(
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="a case of your own instead: several rotors, ground, walls, roofs (`rotorjax new several` writes one)",
+    )
     parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake, rigid blades, no PDF")
     parser.add_argument("--rigid", action="store_true", help="blades that do not flap")
     parser.add_argument("--heights", nargs="*", type=float, metavar="H", help="level heights over R")
@@ -36,6 +43,8 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.study.output import write_all
     from rotorjax.study.run import solve_cases
 
+    if chosen.config is not None:
+        return _arranged(chosen)
     started = time.perf_counter()
     heights = (QUICK_HEIGHTS if chosen.quick else HEIGHTS) if chosen.heights is None else chosen.heights
     slopes = (QUICK_SLOPES_DEG if chosen.quick else SLOPES_DEG) if chosen.slopes is None else chosen.slopes
@@ -62,3 +71,33 @@ def run(chosen: argparse.Namespace) -> int:
     if result.diverged:
         print("not converged: " + ", ".join(result.diverged))
     return 1 if result.diverged else 0
+
+
+def _arranged(chosen: argparse.Namespace) -> int:
+    """Solve a case file by both models; the exit code."""
+    from tqdm import tqdm
+
+    from rotorjax.errors import InputError
+    from rotorjax.io.atomic import make_folder
+    from rotorjax.study.arranged import solve_arrangement, write_arranged
+    from rotorjax.study.arrangement import read_arrangement
+
+    beside = {"rigid": chosen.rigid, "collective": chosen.collective is not None}
+    beside |= {name: getattr(chosen, name) is not None for name in ("heights", "slopes", "calibration")}
+    if given := [name for name, there in beside.items() if there]:
+        raise InputError(f"Argument `{given[0]}` must be left out with --config, whose file says what is solved")
+    case = read_arrangement(chosen.config, chosen.quick)
+    folder = make_folder(chosen.out)
+    introduce(case.settings.rotor, case.settings.operating)
+    with tqdm(desc="study", unit="step", file=sys.stderr) as bar:
+
+        def progress(stage: str, residual: float) -> None:
+            bar.set_postfix_str(f"{stage}, residual {residual:.1e}", refresh=False)
+            bar.update(1)
+
+        found = solve_arrangement(case, progress)
+    write_arranged(found, folder)
+    print(f"{len(case.places)} rotors in {found.seconds:.0f} s: {folder / 'report.html'}")
+    if not found.wake.converged:
+        print(f"not converged: {found.wake.why}")
+    return 0 if found.wake.converged else 1

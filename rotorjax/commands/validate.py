@@ -14,12 +14,23 @@ def register(commands: argparse._SubParsersAction) -> None:
         "validation.md and pictures. Exit code 1 where a row is out.",
     )
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder for all results")
-    parser.add_argument("--case", nargs="+", metavar="NAME", help="only these cases (all that suit the rotor)")
+    parser.add_argument(
+        "--case",
+        nargs="+",
+        metavar="NAME",
+        help="only these cases (all that suit the rotor but `coaxial`, a pair that takes minutes)",
+    )
     parser.add_argument("--quick", action="store_true", help="fewer cases, coarser free wake")
     parser.add_argument(
         "--rotor", metavar="NAME|FILE", help="another rotor, catalogue name or TOML file, in every case"
     )
     parser.add_argument("--collective", type=float, metavar="DEG", help="its collective pitch (the rotor file's)")
+    parser.add_argument(
+        "--measured",
+        type=Path,
+        metavar="FILE",
+        help="with --case coaxial: your own CSV of measured points, columns rotors (single or pair), CT and CQ",
+    )
     parser.set_defaults(run=run)
 
 
@@ -28,10 +39,12 @@ def run(chosen: argparse.Namespace) -> int:
     from rotorjax.io.atomic import make_folder
     from rotorjax.validation.case import Subject
     from rotorjax.validation.cases import chosen_cases
+    from rotorjax.validation.coaxial import read_measured
     from rotorjax.validation.output import write
     from rotorjax.validation.run import validate
 
-    subject = Subject(chosen.rotor, chosen.collective, chosen.quick)
+    measured = None if chosen.measured is None else read_measured(chosen.measured)
+    subject = Subject(chosen.rotor, chosen.collective, chosen.quick, measured)
     cases = chosen_cases(chosen.case, subject)
     for case in cases:
         for at in case.points(subject)[:1]:

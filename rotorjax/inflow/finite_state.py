@@ -104,13 +104,16 @@ class FiniteStateInflow(InflowModel):
         return eqx.tree_at(lambda m: m.ground, over, ground), uphill
 
     def _in_wind(self, state: Float[Array, " M"], inputs: RotorInputs) -> FiniteStateModel:
-        """The model whose wake contracts as the wind along the disk lets it, by momentum theory."""
-        if self.model.wake is None:
-            return self.model
+        """The model whose wake contracts as the wind along the disk lets it, by momentum theory, and leans with it."""
         wind, first = edgewise(inputs), 2 / jnp.sqrt(3.0) * state[self.model.modes.index(0, 1)]
+        rest = (wind[0] == 0) & (wind[1] == 0)
+        speed = jnp.where(rest, 0.0, jnp.sqrt(jnp.where(rest, 1.0, wind @ wind)))
+        model = eqx.tree_at(lambda m: m.lean, self.model, speed / jnp.sqrt(first**2 + STILL))
+        if model.wake is None:
+            return model
         squares = jnp.stack([wind @ wind + (n * first) ** 2 + STILL for n in (1, 2)])  # of V_T at the disk, far below
-        wake = self.model.wake.in_stream(jnp.sqrt(squares[0] / squares[1]))
-        return eqx.tree_at(lambda m: m.wake, self.model, wake)
+        wake = model.wake.in_stream(jnp.sqrt(squares[0] / squares[1]))
+        return eqx.tree_at(lambda m: m.wake, model, wake)
 
 
 def _turn(modes: ModeTable, cosine: Float[Array, ""], sine: Float[Array, ""]) -> Float[Array, "M M"]:

@@ -27,7 +27,8 @@ _WORDS = {
 
 
 class Key(NamedTuple):
-    """What a key holds. range: of each of its numbers. required: whether it must be there. choices: of a text.
+    """What a key holds. range: of each of its numbers. required: whether it must be there. choices: of a text. least:
+    how many numbers a list has.
 
     A "stations" is a number or a table {r = [...], value = [...]}, r over R, and comes out as a float or a pair.
     """
@@ -36,6 +37,7 @@ class Key(NamedTuple):
     range: Range = Range()
     required: bool = False
     choices: tuple[str, ...] = ()
+    least: int = 2
 
 
 OTHERS = "*"
@@ -159,7 +161,7 @@ def _flag(where: str, value: Any, key: Key) -> bool:
 def _numbers(where: str, value: Any, key: Key) -> list[float]:
     if not isinstance(value, list):
         raise _wrong(where, value, key)
-    return [float(v) for v in check_list(where, value, key.range)]
+    return [float(v) for v in check_list(where, value, key.range, key.least)]
 
 
 def _stations(where: str, value: Any, key: Key) -> float | tuple[list[float], list[float]]:

@@ -100,29 +100,37 @@ def anderson(
             return np.asarray(linear.at(g, unravel, point, args)[0])
         return np.asarray(flat_residual(g, unravel, point, args)) - x
 
-    x = np.asarray(flat)
-    past, share = _Window(window, x.size), mixing
     with Log("anderson", attainable(tol, flat.dtype), max_iterations, progress) as log:
-        f = residual(x)
-        best_f = f
-        done = log.note(x, measure(f, x))
-        while not done and len(log.residuals) <= max_iterations:
-            new = past.advance(x, f, share)
-            new_f = residual(new)
-            size, best = measure(new_f, new), log.best
-            done = log.note(new, size)
-            if not size <= safeguard * best:
-                past.clear()
-                share = share / 2
-                x, f = log.best_x, best_f
-                if share < mixing / 2**10 or not np.isfinite(best):
-                    log.why = (
-                        f"diverged: from the best residual {log.best:.2e} even a mixing of {2 * share:.1e} goes up"
-                    )
-                    break
-                continue
-            if size < best:
-                share, best_f = mixing, new_f
-            past.push(new - x, new_f - f)
-            x, f = new, new_f
+        _iterate(log, residual, measure, np.asarray(flat), _Window(window, flat.size), mixing, safeguard)
     return log.outcome(unravel)
+
+
+def _iterate(
+    log: Log,
+    residual: Callable[[np.ndarray], np.ndarray],
+    measure: Measure,
+    x: np.ndarray,
+    past: _Window,
+    mixing: float,
+    safeguard: float,
+) -> None:
+    """Note iterates from x on until one is good enough, or none can be."""
+    f = best_f = residual(x)
+    share, done = mixing, log.note(x, measure(f, x))
+    while not done and len(log.residuals) <= log.limit:
+        new = past.advance(x, f, share)
+        new_f = residual(new)
+        size, best = measure(new_f, new), log.best
+        done = log.note(new, size)
+        if not size <= safeguard * best:
+            past.clear()
+            share = share / 2
+            x, f = log.best_x, best_f
+            if share < mixing / 2**10 or not np.isfinite(best):
+                log.why = f"diverged: from the best residual {log.best:.2e} even a mixing of {2 * share:.1e} goes up"
+                return
+            continue
+        if size < best:
+            share, best_f = mixing, new_f
+        past.push(new - x, new_f - f)
+        x, f = new, new_f

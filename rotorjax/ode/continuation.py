@@ -20,6 +20,33 @@ Solve = Callable[[PyTree, float, Any], Outcome]
 
 
 @dataclass(frozen=True)
+class Steps:
+    """Steps along a branch. first, smallest, largest: lengths, by default what the method says. easy: iterations up to
+    which the next step is half as long again.
+    """
+
+    first: float | None = None
+    smallest: float | None = None
+    largest: float | None = None
+    easy: int = 4
+
+    def of(self, first: float, smallest: float, largest: float) -> "Steps":
+        """These with the usual lengths where none is given. Raises InputError where one is not positive."""
+        usual = {"first": first, "smallest": smallest, "largest": largest}
+        found = {name: length if getattr(self, name) is None else getattr(self, name) for name, length in usual.items()}
+        if min(found.values()) <= 0:
+            raise InputError(
+                "Argument `steps` must have positive lengths, and the two ends must differ, but has "
+                + ", ".join(f"{name} {length:g}" for name, length in found.items())
+            )
+        return replace(self, **found)
+
+    def after(self, step: float, iterations: int) -> float:
+        """Length of the next step after one that took so many iterations."""
+        return min(1.5 * step, self.largest or np.inf) if iterations <= self.easy else step
+
+
+@dataclass(frozen=True)
 class Branch:
     """Converged solutions along a parameter.
 
@@ -58,7 +85,8 @@ def _secant(outcomes: list[Outcome], parameters: list[float], target: float, car
     return jax.tree.map(ahead, guess, outcomes[-1].x, expected)
 
 
-def _unchanged(x: PyTree, here: float, there: float) -> PyTree:
+def unchanged(x: PyTree, here: float, there: float) -> PyTree:
+    """Return x: what `continuation` carries where nothing is known."""
     return x
 
 
@@ -68,39 +96,44 @@ def continuation(
     start: float,
     stop: float,
     *,
-    step: float | None = None,
-    smallest: float | None = None,
-    largest: float | None = None,
-    easy: int = 4,
+    steps: Steps = Steps(),
     jump: float = 0.1,
-    carry: Carry = _unchanged,
+    carry: Carry = unchanged,
     progress: bool = False,
 ) -> Branch:
     """Follow x(p) from p = start to stop in steps that adapt to how hard each one was.
 
     solve(x, p, memory): finds the solution at p from the guess x; `memory` is that of the last outcome (pass it on to
-    `newton` to reuse a factorised Jacobian, or ignore it). step, smallest, largest: first, least and greatest step in
-    p, by default 1/10, 1/1000 and 1/2 of the way. A step grows by half after at most `easy` iterations and is
-    halved where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and than
-    twice the step it was to correct. Guesses are extrapolated from the last two solutions; carry(x, p, p') moves a
+    `newton` to reuse a factorised Jacobian, or ignore it). steps: in p, by default 1/10, 1/1000 and 1/2 of the way. A
+    step is halved where `solve` fails or lands on another branch: further from the guess than `jump` (relative rms) and
+    than twice the step it was to correct. Guesses are extrapolated from the last two solutions; carry(x, p, p') moves a
     solution from p to p' where its main part is known (a wake with the ground), and only the rest is extrapolated.
 
-    Where the step falls below `smallest` the branch ends there, with `reached` False and the last failure kept: a fold
-    (see `follow`), or a solver that needs help.
+    Where the step falls below the smallest the branch ends there, with `reached` False and the last failure kept: a
+    fold (see `follow`), or a solver that needs help.
 
     Raises InputError where start equals stop or a step is not positive.
     """
-    way = stop - start
-    step, smallest, largest = _lengths((step, smallest, largest), (abs(way) / 10, abs(way) / 1000, abs(way) / 2))
+    way = abs(stop - start)
+    steps = steps.of(way / 10, way / 1000, way / 2)
     first = solve(x0, start, None)
     if not first.converged:
         return Branch((), (), False, f"no solution at the start, {start}: {first.why}", failed=first)
-    parameters, outcomes, failed = [start], [first], None
-    bar, why = tqdm(total=abs(way), desc="continuation", disable=not progress), f"reached {stop:.6g}"
+    with tqdm(total=way, desc="continuation", disable=not progress) as bar:
+        return _walk(solve, first, (start, stop), steps, jump, carry, bar)
+
+
+def _walk(
+    solve: Solve, first: Outcome, ends: tuple[float, float], steps: Steps, jump: float, carry: Carry, bar: tqdm
+) -> Branch:
+    """The branch from the first solution on."""
+    start, stop = ends
+    parameters, outcomes, failed, why = [start], [first], None, f"reached {stop:.6g}"
+    step = steps.first or 0.0
     while parameters[-1] != stop:
         left = stop - parameters[-1]
         # A sliver of a last step would only cost a solve: stretch this one over it.
-        target = stop if abs(left) <= 1.2 * step else parameters[-1] + float(np.sign(way)) * step
+        target = stop if abs(left) <= 1.2 * step else parameters[-1] + float(np.sign(left)) * step
         guess = _secant(outcomes, parameters, target, carry)
         found = solve(guess, target, outcomes[-1].memory)
         if found.converged and len(outcomes) > 1 and _jumped(found.x, guess, outcomes[-1].x, jump):
@@ -109,24 +142,13 @@ def continuation(
             bar.update(abs(target - parameters[-1]))
             parameters.append(target)
             outcomes.append(found)
-            step = min(step * 1.5, largest) if found.iterations <= easy else step
+            step = steps.after(step, found.iterations)
             continue
         failed, step = found, min(step, abs(left)) / 2
-        if step < smallest or found.interrupted:
+        if step < (steps.smallest or 0.0) or found.interrupted:
             why = f"lost at {parameters[-1]:.6g} on the way to {stop:.6g}, step {step:.2g}: {found.why}"
             break
-    bar.close()
     return Branch(tuple(parameters), tuple(outcomes), parameters[-1] == stop, why, failed=failed)
-
-
-def _lengths(asked: tuple[float | None, ...], usual: tuple[float, ...]) -> list[float]:
-    """First, least and greatest step: those asked for, else the usual ones, all positive."""
-    found = [normal if given is None else given for given, normal in zip(asked, usual, strict=True)]
-    if min(found) <= 0:
-        raise InputError(
-            f"Arguments `step`, `smallest` and `largest` must be positive, and the two ends differ, but are {found}"
-        )
-    return found
 
 
 def _jumped(found: PyTree, guess: PyTree, last: PyTree, jump: float) -> bool:
@@ -158,18 +180,15 @@ def follow(
     second: tuple[PyTree, float],
     *args: Any,
     points: int = 50,
-    step: float | None = None,
-    smallest: float | None = None,
-    largest: float | None = None,
+    steps: Steps = Steps(),
     between: tuple[float, float] = (-np.inf, np.inf),
-    easy: int = 4,
     progress: bool = False,
     **newton_settings: Any,
 ) -> Branch:
     """Follow residual(x, p, *args) = 0 through folds by pseudo-arclength (Keller 1977) from two solutions (x, p) on it.
 
-    step, smallest, largest: first, least and greatest arc length between points, in the norm √(mean square of x + p²),
-    by default the distance of the two solutions, 1/1000 and 10 times of it. Ends after `points` points, or where p
+    steps: arc lengths between points, in the norm √(mean square of x + p²), by default the distance of the two
+    solutions, 1/1000 and 10 times of it. Ends after `points` points, or where p
     leaves `between`. Further settings go to `newton`.
 
     Raises InputError where the two solutions coincide.
@@ -178,7 +197,8 @@ def follow(
         flatten(x)
     anchor, z = (_point(*first), _point(*second))
     distance = _distance(z, anchor)
-    step, smallest, largest = _lengths((step, smallest, largest), (distance, distance / 1000, 10 * distance))
+    steps = steps.of(distance, distance / 1000, 10 * distance)
+    step, smallest = steps.first or 0.0, steps.smallest or 0.0
     parameters, outcomes, failed = [], [], None
     reached, why = True, f"followed {points} points"
     for _ in tqdm(range(points), desc="branch", disable=not progress):
@@ -189,7 +209,7 @@ def follow(
         anchor, z = z, found.x
         parameters.append(float(z[1]))
         outcomes.append(found)
-        step = min(1.5 * step, largest) if found.iterations <= easy else step
+        step = steps.after(step, found.iterations)
         if not between[0] <= parameters[-1] <= between[1]:
             why = f"left {between} at {parameters[-1]:.6g}"
             break

@@ -82,23 +82,39 @@ def linearise(
         whole, values = _sweep(joint, z, times, (flat_u, p), rows, chunk, progress)
     else:
         whole, values = _given(derivative, times, states, rows, np.concatenate([np.arange(n), n + chosen]))
-    names, outs = tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept)
+    names = (x_names, tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept))
+    about = (np.asarray(flat_x), np.asarray(flat_u)[chosen], values[:, n:])
+    return _model(np.asarray(times), float(orbit.period), whole, about, names, units)
+
+
+def _model(
+    times: np.ndarray,
+    period: float,
+    whole: np.ndarray,
+    about: tuple[np.ndarray, np.ndarray, np.ndarray],
+    names: tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]],
+    units: Mapping[str, str] | None,
+) -> PeriodicModel:
+    """The model of [[A, B], [C, D]] at the times (K, n + q, n + m), about (x, u, y) with these names."""
+    n = len(names[0])
+    states, inputs, outputs = names
+    x, u, y = about
     return PeriodicModel(
-        t=np.asarray(times),
-        period=float(orbit.period),
+        t=times,
+        period=period,
         a=whole[:, :n, :n],
         b=whole[:, :n, n:],
         c=whole[:, n:, :n],
         d=whole[:, n:, n:],
-        states=x_names,
-        inputs=names,
-        outputs=outs,
-        state_units=units_of(x_names, units),
-        input_units=units_of(names, units),
-        output_units=units_of(outs, units),
-        x=np.asarray(flat_x),
-        u=np.asarray(flat_u)[chosen],
-        y=values[:, n:],
+        states=states,
+        inputs=inputs,
+        outputs=outputs,
+        state_units=units_of(states, units),
+        input_units=units_of(inputs, units),
+        output_units=units_of(outputs, units),
+        x=x,
+        u=u,
+        y=y,
     )
 
 

@@ -72,33 +72,45 @@ def newton(
         value, place = linear.at(residual, unravel, jnp.asarray(x, flat.dtype), args)
         return np.asarray(value), place
 
-    x = np.asarray(flat)
     with Log("newton", attainable(tol, flat.dtype), max_iterations, progress) as log:
-        f, place = evaluate(x)
-        size = measure(f, x)
-        done = log.note(x, size)
-        if not np.isfinite(size):
-            log.why = "the residual is not finite at the start"
-        while not done and np.isfinite(size) and len(log.residuals) <= max_iterations:
-            fresh = memory is None
-            direction, memory = linear.direction(place, f, memory)
-            share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size, smallest_step)
-            if new_size >= size:
-                again, memory = linear.retry(memory, fresh)
-                if not again:
-                    log.why = (
-                        f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
-                        f"lowers the residual (a fold, a kink or the limit of precision{advice(flat.dtype)})"
-                    )
-                    break
-                continue
-            done = log.note(new, new_size)
-            if share == 1:
-                memory = linear.learn(memory, new - x, new_f - f, new_size / size)
-            else:
-                _, memory = linear.retry(memory, fresh)
-            x, f, place, size = new, new_f, new_place, new_size
-    return log.outcome(unravel, memory)
+        log.memory = memory
+        _iterate(log, evaluate, measure, linear, np.asarray(flat), smallest_step)
+    return log.outcome(unravel)
+
+
+def _iterate(
+    log: Log,
+    evaluate: Callable[[np.ndarray], tuple],
+    measure: Measure,
+    linear: LinearSolve,
+    x: np.ndarray,
+    smallest: float,
+) -> None:
+    """Note iterates from x on until one is good enough or none can be, and what the linear solver can reuse."""
+    f, place = evaluate(x)
+    size = measure(f, x)
+    done = log.note(x, size)
+    if not np.isfinite(size):
+        log.why = "the residual is not finite at the start"
+    while not done and np.isfinite(size) and len(log.residuals) <= log.limit:
+        fresh = log.memory is None
+        direction, log.memory = linear.direction(place, f, log.memory)
+        share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size, smallest)
+        if new_size >= size:
+            again, log.memory = linear.retry(log.memory, fresh)
+            if not again:
+                log.why = (
+                    f"stalled at residual {size:.2e}: no step along Newton's direction, down to {share:.0e} of it, "
+                    f"lowers the residual (a fold, a kink or the limit of precision{advice(x.dtype)})"
+                )
+                return
+            continue
+        done = log.note(new, new_size)
+        if share == 1:
+            log.memory = linear.learn(log.memory, new - x, new_f - f, new_size / size)
+        else:
+            _, log.memory = linear.retry(log.memory, fresh)
+        x, f, place, size = new, new_f, new_place, new_size
 
 
 def _backtrack(

@@ -120,6 +120,7 @@ class Log:
         self.residuals: list[float] = []
         self.best, self.why, self.interrupted = float("inf"), "", False
         self.best_x: Any = None
+        self.memory: Any = None
         self._bar = tqdm(total=max_iterations, desc=title, disable=not progress)
         self._start = time.perf_counter()
 
@@ -147,11 +148,11 @@ class Log:
             return True
         return False
 
-    def outcome(self, unravel: Callable, memory: Any = None) -> Outcome:
+    def outcome(self, unravel: Callable) -> Outcome:
         """Pack up the best iterate."""
         made = len(self.residuals) - 1
         converged = self.best <= self.tol
         why = self.why or f"residual {self.best:.2e} is above {self.tol:.1e} after {made} of {self.limit} iterations"
         spent = time.perf_counter() - self._start
         x = unravelled(unravel, np.asarray(self.best_x))
-        return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, memory, self.interrupted)
+        return Outcome(x, self.best, tuple(self.residuals), made, converged, why, spent, self.memory, self.interrupted)

@@ -34,6 +34,12 @@ ON_GROUND = 1e-6
 FOOTPRINT = 0.7
 """Radius over R of the Gaussian with which what lies under a rotor counts for its floor."""
 
+SPOTS = 2
+"""Places along each side of a panel at which the flow between the middles is looked at."""
+
+LEAKY = 0.3
+"""Share of what blows on surfaces that goes through between the panels' middles, beyond which a user is warned."""
+
 DEEPEST = 100.0
 """Depth over R of the floor where nothing lies under the rotor: a wake over it is that in free air, to 1e-6."""
 
@@ -143,6 +149,41 @@ def normal_flow(panels: Panels, ground: Plane | None, density: Float[Array, " P"
     normals = panels.normals
     # a panel's own flow at its middle is along the panel; its own part of n·v is the limit from the air, a half
     return jnp.sum(flow * normals, axis=1) + 0.5 * density
+
+
+def watched(panels: Panels) -> Float[Array, "P W 3"]:
+    """Where a flow is looked at for `leak`: each panel's middle, then SPOTS² places spread over it."""
+    return jnp.concatenate([panels.middles[:, None], panels.spots(SPOTS)[0]], axis=1)
+
+
+def leak(surfaces: Solid, ground: Plane | None, blown: Float[Array, "I P W"]) -> Float[Array, ""]:
+    """Share of a flow that goes through between the panels' middles: normal velocities left there over those of the
+    flow alone, both rms over all faces and instants.
+
+    blown: normal velocities of the flow at the points of `watched`. Close before a panel a flow changes within it, and
+    one density cannot answer that: smaller panels can.
+    """
+    panels, (points, shares) = surfaces.panels, surfaces.panels.spots(SPOTS)
+    weights = panels.areas[:, None] * shares
+
+    def of_instant(one: Float[Array, "P W"]) -> tuple[Array, Array]:
+        density = surfaces.densities(one[:, 0], ground)
+        answer = panel_velocity(points.reshape(-1, 3), panels.corners, density, ground).reshape(points.shape)
+        left = one[:, 1:] + jnp.sum(answer * panels.normals[:, None], axis=-1) + 0.5 * density[:, None]
+        return jnp.sum(weights * left**2), jnp.sum(weights * one[:, 1:] ** 2)
+
+    left, met = jax.lax.map(of_instant, blown)
+    return jnp.sqrt(jnp.sum(left) / jnp.sum(met))
+
+
+def told(share: float | None) -> str | None:
+    """What to know of surfaces that leak, in one line; None of those that do not."""
+    if share is None or not share > LEAKY:
+        return None
+    return (
+        f"{100 * share:.0f} % of what blows on the surfaces goes through between their panels' middles: where the wake "
+        "runs close to them take smaller panels (`panel`), until little changes"
+    )
 
 
 @jax.custom_jvp

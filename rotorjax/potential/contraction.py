@@ -56,6 +56,12 @@ class Contraction(eqx.Module):
         """The wake of a rotor that hovers at a height over ground, over R."""
         return self.shared(1 / (1 + (self.clearance / height) ** 3))
 
+    def radii_down_to(self, depth: Float[Array, "*N"]) -> Float[Array, "*N"]:
+        """∫ ds/ρ(s) from the disk down to a depth, over R: how many radii of its own the wake is long there."""
+        length = self.length + 1e-12  # a wake that does not contract has none
+        rho = self.radius + (1 - self.radius) * jnp.exp(-depth / length)
+        return (depth + length * jnp.log(rho)) / self.radius
+
     def in_stream(self, ratio: Float[Array, ""]) -> "Contraction":
         """The wake in a stream. ratio: V_T of the disk over that of the slipstream, ½ in hover, 1 where the wind
         outruns the inflow: momentum theory's κ².

@@ -16,6 +16,7 @@ and the model carries it (`Settings`); `finite_state_model(printed=True)` is the
 | ground_in_mass_flow | V_T, V̄ of the inflow that the disk has | V = √(C_T/2), the ground left out |
 | slope | "tilted": sources where the plane is | "sheared": at the depth under each point (Eq. 9) |
 | wake | `contraction()`: it narrows to R/√2 | None: a cylinder |
+| wake_edge | "free": gives way as a jet's, tilts fade on the way up (`potential.wake_edge`) | "rigid" |
 | mass_flow | "harmonics": V_T, and V̄ for harmonics | "paper": V̄ = 2V for all but the first state (Eq. 4) |
 
 Lengths over R, velocities over ΩR, hub frame (x aft, y to starboard, z up); inflow positive down.
@@ -49,11 +50,13 @@ from rotorjax.potential.ground_source import (
     source_solver,
 )
 from rotorjax.potential.modes import ModeTable, ground_modes, rotor_modes
+from rotorjax.potential.wake_edge import with_free_edge
 from rotorjax.region import Region
 
 MassFlow = Literal["harmonics", "paper", "linear"]
 Strengths = Literal["closed", "printed"]
 Slope = Literal["tilted", "sheared"]
+WakeEdge = Literal["free", "rigid"]
 MEAN = DiskQuadrature(16, 16)  # of the sources' upflow, smooth on the disk
 SPOTS = 4  # along each side of a panel, for the mean of the wake's column over it
 LOWEST_EVEN = 0.2
@@ -68,6 +71,7 @@ class Settings(TypedDict, total=False):
     ground_in_mass_flow: bool
     slope: Slope
     wake: Contraction | None
+    wake_edge: WakeEdge
     mass_flow: MassFlow
     b: float
     p: float
@@ -83,6 +87,7 @@ PRINTED = Settings(
     ground_in_mass_flow=False,
     slope="sheared",
     wake=None,
+    wake_edge="rigid",
     mass_flow="paper",
 )
 _CHOICES = {
@@ -90,6 +95,7 @@ _CHOICES = {
     "ground_parity": ("even", "odd"),
     "ground_in_mass_flow": (True, False),
     "slope": get_args(Slope),
+    "wake_edge": get_args(WakeEdge),
     "mass_flow": get_args(MassFlow),
 }
 
@@ -101,8 +107,9 @@ class FiniteStateModel(eqx.Module):
     p of the factor on the r = j terms. quadrature: nodes of the correlation integrals (static). wake: how it contracts
     far from the ground, None for a cylinder. surfaces: beside and under the rotor, or None. region: the part of the
     plane where there is ground, None for all of it. ground_radius (): of the ground disk, over R, None for that of the
-    wake there. strengths, ground_in_mass_flow, slope, mass_flow: static, see the module's head; mass_flow "paper" gives
-    V_T to a_1^0 and V̄ to all others, "linear" V_T to all, "harmonics" V_T to the axisymmetric ones.
+    wake there. lean (): tan χ of the wake in a wind, which a free edge alone heeds. strengths, ground_in_mass_flow,
+    slope, wake_edge, mass_flow: static, see the module's head; mass_flow "paper" gives V_T to a_1^0 and V̄ to all
+    others, "linear" V_T to all, "harmonics" V_T to the axisymmetric ones.
     """
 
     modes: ModeTable
@@ -118,6 +125,8 @@ class FiniteStateModel(eqx.Module):
     strengths: Strengths = eqx.field(static=True, default="closed")
     ground_in_mass_flow: bool = eqx.field(static=True, default=False)
     slope: Slope = eqx.field(static=True, default="sheared")
+    wake_edge: WakeEdge = eqx.field(static=True, default="rigid")
+    lean: Float[Array, ""] | float = 0.0
 
     def __check_init__(self) -> None:
         """Raise InputError where the modes' parities do not match their use."""
@@ -171,16 +180,7 @@ def finite_state_model(
     (`rotorjax.region`, best with ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk.
     Raises InputError where a count or a setting is not allowed.
     """
-    chosen: dict[str, Any] = {
-        "strengths": "closed",
-        "ground_parity": "odd",
-        "ground_in_mass_flow": True,
-        "slope": "tilted",
-        "wake": contraction(),
-        "mass_flow": "harmonics",
-        **(PRINTED if printed else {}),
-        **settings,
-    }
+    chosen: dict[str, Any] = {**(PRINTED if printed else _default(surfaces)), **settings}
     _check(chosen, harmonics, ground_harmonics)
     _check_height(ground, chosen)
     if surfaces is not None:
@@ -196,7 +196,20 @@ def finite_state_model(
         chosen.get("region"),
         None if radius is None else jnp.asarray(radius, float),
         surfaces=None if surfaces is None else solid(surfaces, ground),
-        **{name: chosen[name] for name in ("wake", "strengths", "ground_in_mass_flow", "slope")},
+        **{name: chosen[name] for name in ("wake", "strengths", "ground_in_mass_flow", "slope", "wake_edge")},
+    )
+
+
+def _default(surfaces: Panels | None) -> Settings:
+    """The choices that agree best; beside surfaces the wake keeps its edge."""
+    return Settings(
+        strengths="closed",
+        ground_parity="odd",
+        ground_in_mass_flow=True,
+        slope="tilted",
+        wake=contraction(),
+        wake_edge="free" if surfaces is None else "rigid",
+        mass_flow="harmonics",
     )
 
 
@@ -236,6 +249,11 @@ def _check_surfaces(surfaces: Panels, ground: Plane | None, chosen: dict[str, An
     """Raise InputError where surfaces cut the disk, or a setting or a slope does not go with them."""
     check_panels(surfaces)
     check_clear(surfaces)
+    if chosen["wake_edge"] != "rigid":
+        raise InputError(
+            "Argument `wake_edge` must be 'rigid' beside surfaces, whose flow has all three components, but is "
+            f"{chosen['wake_edge']!r}: leave it out"
+        )
     if chosen.get("even_terms", 0):
         raise InputError(
             f"Argument `even_terms` must be 0 beside surfaces, which answer steady flow, but is {chosen['even_terms']}"
@@ -261,9 +279,9 @@ def _check_surfaces(surfaces: Panels, ground: Plane | None, chosen: dict[str, An
 
 def choices(model: FiniteStateModel) -> dict[str, Any]:
     """Return the model's choices by name, as plain values; the wake by its three numbers, absent where a cylinder."""
-    named = {name: getattr(model, name) for name in ("strengths", "ground_in_mass_flow", "slope", "mass_flow")}
+    names = ("strengths", "ground_in_mass_flow", "slope", "wake_edge", "mass_flow")
     wake = {} if model.wake is None else {f"wake_{k}": float(v) for k, v in vars(model.wake).items()}
-    return {**named, "ground_parity": model.sources.parity, **wake}
+    return {**{name: getattr(model, name) for name in names}, "ground_parity": model.sources.parity, **wake}
 
 
 def wake_over(model: FiniteStateModel, ground: Plane | None) -> Contraction | None:
@@ -322,6 +340,14 @@ def strength_factors(model: FiniteStateModel) -> tuple[Float[Array, " G"], Float
 
 def ground_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "G ..."]:
     """Return the upward velocity of unit ground states at hub-frame points above a plane (Eqs. 35, 46)."""
+    if model.wake_edge == "free":
+        wake = wake_over(model, ground)
+        return with_free_edge(lambda places: _sources_upflow(model, ground, places), ground, wake, model.lean, points)
+    return _sources_upflow(model, ground, points)
+
+
+def _sources_upflow(model: FiniteStateModel, ground: Plane, points: Float[Array, "*N 3"]) -> Float[Array, "G ..."]:
+    """Upward velocity of the sources themselves, whatever the wake's edge does."""
     size = source_radius(model, ground)
     ground, points = Plane(ground.height / size, ground.slope), points / size
     if model.slope == "tilted":
@@ -397,7 +423,7 @@ def _ground_means(model: FiniteStateModel, ground: Plane) -> Float[Array, " G"]:
     half = y > 0  # the plane rises along x: cosines are even in y, and sines have no mean
     points = jnp.asarray(np.stack([x, y, 0 * x], axis=-1)[half])  # r dr = −ν dν
     cosine = np.array([mode.kind == "cos" for mode in model.sources.modes])
-    return jnp.where(cosine, ground_upflow(model, ground, points) @ (4 * nu * weights)[half], 0.0)
+    return jnp.where(cosine, _sources_upflow(model, ground, points) @ (4 * nu * weights)[half], 0.0)
 
 
 def rotor_means(model: FiniteStateModel, ground: Plane | None) -> Float[Array, " M"]:

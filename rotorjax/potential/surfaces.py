@@ -22,6 +22,9 @@ from rotorjax.region import smooth_step
 RIM = 0.1
 """Half-width over R of the step at a shadow's rim: finer than panels, so that middles are on one side of it."""
 
+IN_SHADOW = (6, 5)
+"""Harmonics and terms of the ground's sources beside surfaces: what the rim of a shadow on the ground needs."""
+
 LEVEL = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
 
 

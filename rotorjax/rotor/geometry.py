@@ -157,11 +157,6 @@ def rotor(
     check_range("tip_loss", tip_loss, Range(inner, 1.0, "R, beyond root_cutout", above=True))
     if hinge is not None and known(hinge.offset, radius):
         check_range("hinge.offset", hinge.offset, Range(0.0, 0.5 * float(radius), "m, up to half the radius"))
-    tables = {
-        "chord": _table("chord", chord, root_cutout, CHORD),
-        "twist": _table("twist", twist, root_cutout, Range(-np.pi / 2, np.pi / 2, "rad", hint=_RADIANS)),
-        "sweep": _table("sweep", sweep, root_cutout, Range(-1.39, 1.39, "rad", hint=_RADIANS)),
-    }
     return Rotor(
         name=name,
         blades=blades,
@@ -171,7 +166,9 @@ def rotor(
         airfoil=airfoil,
         hinge=hinge,
         rotation=rotation,
-        **tables,
+        chord=_table("chord", chord, root_cutout, CHORD),
+        twist=_table("twist", twist, root_cutout, Range(-np.pi / 2, np.pi / 2, "rad", hint=_RADIANS)),
+        sweep=_table("sweep", sweep, root_cutout, Range(-1.39, 1.39, "rad", hint=_RADIANS)),
     )
 
 

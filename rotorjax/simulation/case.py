@@ -32,7 +32,6 @@ heads at the start. The path must keep the rim of the disk above the ground; uni
 height alone and take up to 15 degrees between disk and ground, the finite-state model takes 60, the free wake all.
 """
 
-import inspect
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -41,6 +40,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PPoly
 
+from rotorjax.bench.settings import WAKE_KEYS
 from rotorjax.checks import Range
 from rotorjax.errors import InputError
 from rotorjax.io.toml_file import Key, Schema, Tables, read_toml
@@ -95,14 +95,7 @@ SCHEMA: Schema = {
         "old_age": Key("text", choices=get_args(OldAge)),
     },
     "history": {"t": Key("numbers", Range(0.0, 1e6, "s")), **{name: _column(name) for name in COLUMNS}},
-    "wake": {
-        "bound_filter": Key("text", choices=get_args(BoundFilter)),
-        **{
-            name: Key("whole number" if parameter.annotation is int else "number", Range(-1e6, 1e6))
-            for name, parameter in inspect.signature(wake_settings).parameters.items()
-            if name not in ("inboard", "roll_up", "bound_filter", "pair_sums")
-        },
-    },
+    "wake": {"bound_filter": Key("text", choices=get_args(BoundFilter)), **WAKE_KEYS},
 }
 _OF_A_WAKE = ("precision", "old_age")
 _MOST_STEPS = 200_000

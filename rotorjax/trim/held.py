@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.ode.continuation import continuation
+from rotorjax.ode.continuation import Steps, continuation
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
 from rotorjax.rotor.flap_lag import blade_of
@@ -89,7 +89,7 @@ def let_flap(rigid: Solution, progress: Progress | None = None, tol: float = 1e-
         search.note(f"flapping {share:.2f}", found)
         return found
 
-    branch = continuation(step, guess, 0.0, 1.0, step=1.0, largest=1.0, smallest=SMALLEST, jump=1.0)
+    branch = continuation(step, guess, 0.0, 1.0, steps=Steps(1.0, SMALLEST, 1.0), jump=1.0)
     outcome = branch.last if branch.reached else branch.failed
     assert outcome is not None
     search.ok, search.why = branch.reached, f"flapping blades: {outcome.why if branch.reached else branch.why}"

@@ -22,7 +22,7 @@ from rotorjax.errors import InputError
 from rotorjax.ground import Plane, pitched
 from rotorjax.inflow.momentum import hover_inflow
 from rotorjax.ode.anderson import anderson
-from rotorjax.ode.continuation import Branch, continuation
+from rotorjax.ode.continuation import Branch, Carry, Steps, continuation, unchanged
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import SMALLEST_STEP, newton
 from rotorjax.ode.outcome import Outcome
@@ -230,7 +230,7 @@ def _from_neighbour(p: WakeTrim, near: TrimmedInWake, stages: _Stages) -> Trimme
         wind = (there - here) * (near.p.inputs.velocity - p.inputs.velocity)
         return z._replace(wake=carried(z.wake, p.model, wind))
 
-    branch = _follow("trim", at, near.z, 1.0, stages, BESIDE, carry=carry, smallest=NEAREST)
+    branch = _follow("trim", at, near.z, 1.0, stages, BESIDE, NEAREST, carry)
     last = branch.last if branch.reached or branch.failed is None else branch.failed
     return TrimmedInWake(last.x, p, last if branch.reached else replace(last, converged=False), stages.iterations)
 
@@ -260,7 +260,7 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
     def step(guess, s, memory):
         return stages.newton("trim", guess, at(s), TOL if s == 1 else 1e-5)
 
-    branch = continuation(step, z, 0.0, 1.0, step=1.0, smallest=0.1, largest=1.0, jump=0.3)
+    branch = continuation(step, z, 0.0, 1.0, steps=Steps(1.0, 0.1, 1.0), jump=0.3)
     if branch.reached or branch.failed is None:
         return branch.last
     return replace(branch.failed, why=f"on the way to the thrust: {branch.why}")
@@ -349,10 +349,11 @@ def _follow(
     first: float,
     stages: _Stages,
     share: float = SHARE,
-    **more: Any,
+    smallest: float = LEAST,
+    carry: Carry = unchanged,
 ) -> Branch:
-    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL. share: of passes; more: of
-    `continuation`.
+    """Continuation over s from 0 to 1 with the trim at(s); its end is told apart by TOL. share: of passes;
+    smallest: step; carry: of `continuation`.
     """
 
     def step(guess, s, memory):
@@ -362,8 +363,7 @@ def _follow(
             stages.nearest = found
         return found
 
-    kept = {"smallest": LEAST, "largest": 1.0, "easy": EASY, "jump": 0.5}
-    return continuation(step, x, 0.0, 1.0, step=first, **kept | more)
+    return continuation(step, x, 0.0, 1.0, steps=Steps(first, smallest, 1.0, EASY), jump=0.5, carry=carry)
 
 
 def _lost(x: InWake, why: str, p: WakeTrim, stages: _Stages) -> TrimmedInWake:

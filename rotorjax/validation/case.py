@@ -14,11 +14,15 @@ Wakes = Mapping[Point, Solution]
 
 @dataclass(frozen=True)
 class Subject:
-    """What is validated. rotor, collective_deg: those asked for; None: the rotors of each case. quick: coarse wakes."""
+    """What is validated. rotor, collective_deg: those asked for; None: the rotors of each case. quick: coarse wakes.
+
+    measured: points (C_T, C_Q) that the user has of a case's rotors, by what they were measured on.
+    """
 
     rotor: str | None = None
     collective_deg: float | None = None
     quick: bool = False
+    measured: Mapping[str, Sequence[tuple[float, float]]] | None = None
 
     def hovers(self, *default: Point) -> tuple[Point, ...]:
         """The rotor that was asked for, at its collective, or a case's own points."""

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
+from rotorjax.panels.surface import leak, watched
 from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
@@ -184,6 +185,17 @@ def _flow(
     panels = model.surfaces.panels
     through = jnp.sum((induced(panels.middles, ground) + _past(model)) * panels.normals, axis=1)
     return found + model.surfaces.answer(points, through, ground)
+
+
+def leaked(model: FreeWake, state: WakeState) -> Float[Array, ""]:
+    """Share of what wake and wind blow on the surfaces that goes through between their panels' middles."""
+    assert model.surfaces is not None
+    panels, angles = model.surfaces.panels, azimuths(state)
+    points = watched(panels)
+    places = jnp.broadcast_to(points.reshape(-1, 3), (slices(state) // model.rotor.blades, points.size // 3, 3))
+    flow = at_instants(replace(model, surfaces=None), wake_segments(model, state), places, angles) + _past(model)
+    blown = jnp.sum(flow.reshape(-1, *points.shape) * panels.normals[:, None], axis=-1)
+    return leak(model.surfaces, model.ground, blown)
 
 
 def _past(model: FreeWake) -> Float[Array, "3"]:

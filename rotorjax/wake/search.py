@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.ode.anderson import anderson
-from rotorjax.ode.continuation import Branch, continuation
+from rotorjax.ode.continuation import Branch, Steps, continuation
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.panels.surface import refitted
@@ -145,9 +145,8 @@ class Search:
             return with_the_ground(x, at(here).floor, at(there).floor)
 
         self.prepare(at(0.0), x)
-        branch: Branch = continuation(
-            step, x, 0.0, 1.0, step=first, largest=largest, smallest=smallest, easy=5, jump=0.3, carry=carry
-        )
+        steps = Steps(first, smallest, largest, easy=5)
+        branch: Branch = continuation(step, x, 0.0, 1.0, steps=steps, jump=0.3, carry=carry)
         if not branch.outcomes:
             self.ok, self.why = False, branch.why
             return at(0.0), x

@@ -22,11 +22,10 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from rotorjax.checks import Range, array, check_range, known, refuse, shown
-from rotorjax.errors import InputError
 from rotorjax.ground import Plane
 from rotorjax.operating import OperatingPoint
 from rotorjax.panels.kernel import panel_velocity
-from rotorjax.panels.surface import Panels, Solid, check_clear, floor, solid
+from rotorjax.panels.surface import Panels, Solid, check_clear, floor, leak, solid, watched
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.dynamics import inputs_of
@@ -129,8 +128,8 @@ def several_wakes(
             "rotor", "be one rotor, the kind that all are of (collectives, thrusts and senses may differ)", shown(rotor)
         )
     place = np.array(places, float)
-    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 2 or not np.all(np.isfinite(place)):
-        raise refuse("places", "be finite and of shape (N, 3) for N >= 2 rotors", f"of shape {place.shape}")
+    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 1 or not np.all(np.isfinite(place)):
+        raise refuse("places", "be finite and of shape (N, 3)", f"of shape {place.shape}")
     count = len(place)
     sense = np.array([1 - 2 * (i % 2) for i in range(count)] if senses is None else senses, float)
     if sense.shape != (count,) or not np.all(np.abs(sense) == 1):
@@ -198,9 +197,11 @@ def _check_apart(place: np.ndarray) -> None:
         for j in range(i):
             gap = place[i] - place[j]
             if np.hypot(*gap[:2]) < 2 and abs(gap[2]) < NEAREST:
-                raise InputError(
-                    f"Argument `places` must keep the disks apart, but rotors {j} and {i} at {place[j].tolist()} and "
-                    f"{place[i].tolist()} overlap: move one by 2 R, or by {NEAREST:g} R along its shaft"
+                raise refuse(
+                    "places",
+                    "keep the disks apart",
+                    f"such that rotors {j} and {i} at {place[j].tolist()} and {place[i].tolist()} overlap: move one by "
+                    f"2 R, or by {NEAREST:g} R along its shaft",
                 )
 
 
@@ -299,16 +300,34 @@ def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
     """Source densities of the panels over ΩR at each instant, against the flow of all wakes and their images."""
     surfaces = several.surfaces
     assert surfaces is not None
-    panels, instants = surfaces.panels, several.slices // several.wakes.rotor.blades
+    blown = _blown(several, segments, surfaces.panels.middles, surfaces.panels.normals)
+    return jax.lax.map(lambda one: surfaces.densities(one, several.ground), blown)
+
+
+def leaked(several: SeveralWakes, state: WakeState) -> Float[Array, ""]:
+    """Share of what all wakes blow on the surfaces that goes through between their panels' middles."""
+    surfaces = several.surfaces
+    assert surfaces is not None
+    points, normals = watched(surfaces.panels), surfaces.panels.normals
+    normal = jnp.broadcast_to(normals[:, None], points.shape).reshape(-1, 3)
+    segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
+    blown = _blown(several, segments, points.reshape(-1, 3), normal)
+    return leak(surfaces, several.ground, blown.reshape(-1, *points.shape[:2]))
+
+
+def _blown(
+    several: SeveralWakes, segments: Segments, points: Float[Array, "P 3"], normals: Float[Array, "P 3"]
+) -> Float[Array, "I P"]:
+    """Normal velocity at points of the common frame, of all wakes and their images, at each instant."""
+    instants = several.slices // several.wakes.rotor.blades
 
     def through(one: tuple[FreeWake, Segments, Array, Array, Array]) -> Array:
         model, sources, place, sense, angles = one
-        at = jnp.broadcast_to(mirrored(panels.middles - place, sense), (instants, len(panels), 3))
-        return jnp.sum(mirrored(at_instants(model, sources, at, angles), sense) * panels.normals, axis=-1)
+        at = jnp.broadcast_to(mirrored(points - place, sense), (instants, len(points), 3))
+        return jnp.sum(mirrored(at_instants(model, sources, at, angles), sense) * normals, axis=-1)
 
     each = (several.wakes, segments, several.places, several.senses, several.angles)
-    blown = jnp.sum(jax.lax.map(through, each), axis=0)
-    return jax.lax.map(lambda one: surfaces.densities(one, several.ground), blown)
+    return jnp.sum(jax.lax.map(through, each), axis=0)
 
 
 def told(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation]:

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.checks import known
 from rotorjax.errors import InputError
-from rotorjax.ode.continuation import continuation
+from rotorjax.ode.continuation import Steps, continuation
 from rotorjax.ode.implicit import attach
 from rotorjax.ode.linear import Krylov
 from rotorjax.ode.newton import newton
@@ -70,12 +70,20 @@ class SeveralSolution:
         """Ideal power of the rotors, each on its own disk, over what they take: Σ C_T^1.5/√2 / Σ C_P."""
         return np.sum(self.CT**1.5) / np.sqrt(2) / np.sum(self.CP)
 
+    @property
+    def leak(self) -> float | None:
+        """Share of what blows on the surfaces that goes through between their panels' middles (`panels.surface.leak`);
+        None without any.
+        """
+        return None if self.model.surfaces is None else float(_leaked(self.model, self.state))
+
     def velocity(self, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
         """Induced velocity over ΩR at points of the common frame over R, mean over the blades' passage."""
         return _velocity(self.model, self.state, jnp.asarray(points, float))
 
 
 _velocity = eqx.filter_jit(flow.velocity)
+_leaked = eqx.filter_jit(flow.leaked)
 
 
 class EachInverse(eqx.Module):
@@ -134,7 +142,7 @@ def _by_shares(
         spent += found.iterations
         return found
 
-    branch = continuation(step, x, 0.0, 1.0, step=0.5, largest=1.0, smallest=0.03, easy=5, jump=0.3)
+    branch = continuation(step, x, 0.0, 1.0, steps=Steps(0.5, 0.03, 1.0, easy=5), jump=0.3)
     if not branch.outcomes:
         assert branch.failed is not None
         return _read(_share(several, 0.0), replace(branch.failed, why=branch.why), spent)

@@ -18,7 +18,7 @@ from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, look, spread
-from rotorjax.wake.field import velocity
+from rotorjax.wake.field import leaked, velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, on_host
@@ -79,6 +79,13 @@ class Solution:
         if plane is None:
             return None
         return float(_through_the_ground(self.state, self.model)) / float(np.sqrt(abs(self.CT) / 2))
+
+    @property
+    def leak(self) -> float | None:
+        """Share of what blows on the surfaces that goes through between their panels' middles (`panels.surface.leak`);
+        None without any.
+        """
+        return None if self.model.surfaces is None else float(_leaked(self.model, self.state))
 
 
 ARRAYS = ("r", "widths", "psi", "dct_dr", "inflow", "circulation", "tip_vortex")
@@ -233,3 +240,4 @@ def _through_the_ground(state: WakeState, model: FreeWake) -> Float[Array, ""]:
 
 
 _spread = eqx.filter_jit(spread)
+_leaked = eqx.filter_jit(leaked)

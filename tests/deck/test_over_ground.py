@@ -43,7 +43,7 @@ def at_rest(collective=8.0, height=1.0, slope_deg=5.0, climb=0.0):
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_trim_over_ground_at_rest_is_the_steady_model(variant, models):
     """The ground in the mass flow comes from the table, and has its accuracy."""
-    check_trim(models[variant], {}, tilt=-0.0005, atol=5e-7)
+    check_trim(models[variant], {}, tilt=-0.0001, atol=5e-7)
 
 
 def test_trim_without_the_ground_in_the_mass_flow_is_the_steady_model():

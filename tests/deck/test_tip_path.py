@@ -150,7 +150,7 @@ def test_trim_settles_flapping_and_the_linear_model_has_it(model, uh60):
     found = output(jnp.zeros(()), state, now, model)
     assert 0.03 < found.beta_0 < 0.1
     np.testing.assert_allclose(found.beta_1s, -found.cosine, rtol=0.2)  # less inflow where the ground is near
-    assert found.cosine < -0.0005
+    assert found.cosine < -0.0001
 
 
 def test_derivatives_of_a_march(model):

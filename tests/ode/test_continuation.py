@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.ode.continuation import continuation, critical_direction, follow
+from rotorjax.ode.continuation import Steps, continuation, critical_direction, follow
 from rotorjax.ode.jacobian import dense_jacobian
 from rotorjax.ode.linear import Dense
 from rotorjax.ode.newton import newton
@@ -19,7 +19,7 @@ def solve(x, p, memory):
 
 
 def test_reaches_the_end_where_there_is_no_fold():
-    branch = continuation(solve, jnp.full(2, 2.5), 8.0, -1.5, step=3.0)
+    branch = continuation(solve, jnp.full(2, 2.5), 8.0, -1.5, steps=Steps(first=3.0))
     assert branch.reached
     assert branch.parameters[0] == 8.0
     assert branch.parameters[-1] == -1.5
@@ -66,7 +66,11 @@ def test_an_interrupt_ends_the_branch():
         return float(np.abs(f).max())
 
     branch = continuation(
-        lambda x, p, m: newton(cubic, x, p, tol=1e-12, measure=measure), jnp.full(2, 2.5), 8.0, -1.5, largest=0.3
+        lambda x, p, m: newton(cubic, x, p, tol=1e-12, measure=measure),
+        jnp.full(2, 2.5),
+        8.0,
+        -1.5,
+        steps=Steps(largest=0.3),
     )
     assert len(calls) == 20
     assert not branch.reached
@@ -88,7 +92,9 @@ def test_factors_are_handed_on():
 
 def test_follow_goes_round_both_folds():
     first, second = (solve(jnp.full(2, 2.5), p, None).x for p in (4.0, 3.8))
-    branch = follow(cubic, (first, 4.0), (second, 3.8), points=400, largest=0.2, between=(-3.0, 4.5), tol=1e-11)
+    branch = follow(
+        cubic, (first, 4.0), (second, 3.8), points=400, steps=Steps(largest=0.2), between=(-3.0, 4.5), tol=1e-11
+    )
     assert branch.reached
     x = np.array([float(o.x[0][0]) for o in branch.outcomes])
     p = np.array(branch.parameters)
@@ -110,10 +116,10 @@ def test_critical_direction_at_a_fold():
 
 
 def test_bad_input():
-    with pytest.raises(InputError, match="differ"):
+    with pytest.raises(InputError, match="the two ends must differ"):
         continuation(solve, jnp.ones(1), 1.0, 1.0)
     x = jnp.ones(1)
-    with pytest.raises(InputError, match="the two ends differ"):
+    with pytest.raises(InputError, match="the two ends must differ"):
         follow(cubic, (x, 1.0), (x, 1.0))
     lost = continuation(lambda x, p, m: newton(lambda x: x**2 + 1, x), x, 0.0, 1.0)
     assert not lost.reached

@@ -11,7 +11,7 @@ from rotorjax.ground import plane
 from rotorjax.panels.kernel import SOFT, panel_velocity, seen
 from rotorjax.panels.shapes import box, slab, terrain, wall
 from rotorjax.panels.stl import read_stl
-from rotorjax.panels.surface import Panels, floor, influence, normal_flow, refitted, solid
+from rotorjax.panels.surface import LEAKY, Panels, floor, influence, leak, normal_flow, refitted, solid, told, watched
 
 SQUARE = jnp.array([[[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]])
 OBLIQUE = jnp.array([[[0.2, 0.1, 0.3], [1.1, 0.2, 0.5], [0.4, 0.9, 0.1], [0.4, 0.9, 0.1]]])
@@ -118,6 +118,23 @@ def test_a_large_flat_patch_is_the_image():
         through = jnp.sum(jnp.asarray(flux_of(np.asarray(top.middles))) * top.normals, axis=1)
         found = panel_velocity(points, top.corners, -2 * through)  # panels of one plane leave each other alone
         np.testing.assert_allclose(found[:, 2], image, rtol=most)
+
+
+def test_what_goes_through_between_the_middles():
+    """Panels of one plane leave each other alone: what each cannot answer is the change of the flow from its middle."""
+    shares = []
+    for panel in (0.5, 0.25):
+        flat = slab((-1, -1), (1, 1), -0.4, 0.5, panel)
+        top = Panels(flat.corners[np.asarray(flat.normals)[:, 2] > 0.5])
+        blown = jnp.asarray(flux_of(np.asarray(watched(top))))[..., 2]
+        weights = top.areas[:, None] * top.spots(2)[1]
+        change, met = ((weights * v**2).sum() for v in (blown[:, 1:] - blown[:, :1], blown[:, 1:]))
+        shares.append(float(leak(solid(top), None, jnp.stack([blown, 2 * blown]))))
+        np.testing.assert_allclose(shares[-1], jnp.sqrt(change / met), rtol=1e-6)
+    assert shares[1] < 0.6 * shares[0]
+    assert told(None) is None
+    assert told(LEAKY) is None
+    assert "40 % of what blows" in told(0.4)
 
 
 def test_derivative_by_the_place_of_a_wall():

@@ -10,7 +10,8 @@ from rotorjax.rotor.airfoil import lift_drag
 
 
 def test_names():
-    assert catalogue.names() == ("caradonna_tung", "elliott_althoff", "knight_hefner_2", "knight_hefner_4", "uh60")
+    known = ("caradonna_tung", "elliott_althoff", "knight_hefner_2", "knight_hefner_4", "tn2318_2", "uh60")
+    assert catalogue.names() == known
 
 
 def test_uh60_is_the_papers_table_1():
@@ -45,6 +46,10 @@ def test_caradonna_tung_has_the_reported_tip_mach_number():
     np.testing.assert_allclose(point.tip_mach(rotor.radius), 0.439, atol=5e-5)
     np.testing.assert_allclose(geometry.solidity(rotor), 2 * 0.1905 / (np.pi * 1.143), rtol=1e-12)
     assert rotor.airfoil.prandtl_glauert
+
+
+def test_the_coaxial_pair_of_tn_2318_has_the_reported_solidity():
+    np.testing.assert_allclose(2 * geometry.solidity(catalogue.load("tn2318_2")[0]), 0.152, atol=1e-3)
 
 
 def test_elliott_althoff_flies_at_its_reported_advance_ratio():
@@ -148,7 +153,10 @@ def test_own_file_refuses(folder, old, new, message):
     ("name", "message"),
     [
         ("uh-60", "must be a rotor of the catalogue or a .toml file, but is 'uh-60': did you mean 'uh60'?"),
-        ("xyzzy", "it must be one of caradonna_tung, elliott_althoff, knight_hefner_2, knight_hefner_4, uh60"),
+        (
+            "xyzzy",
+            "it must be one of caradonna_tung, elliott_althoff, knight_hefner_2, knight_hefner_4, tn2318_2, uh60",
+        ),
         (None, "but is None"),
     ],
 )

@@ -113,6 +113,16 @@ def test_an_inflow_model_is_marched_by_the_same_calls(level):
     assert np.mean(thrust) == pytest.approx(level.means.CT, rel=5e-4)  # trimmed with eight azimuths
 
 
+def test_what_is_of_one_rotor_without_surfaces_says_so(level):
+    among = replace(level, request=replace(level.request, surfaces=rj.wall(3.0, -1.0, 1.0, length=1.0, panel=1.0)))
+    with pytest.raises(InputError, match=r"must be a trim without surfaces, but has some: step it by rj\.march"):
+        rj.linearise(among)
+    with pytest.raises(InputError, match=r"be a trim of one rotor \(rj.trim\) or its linear model, but is a Plane"):
+        rj.march(plane(1.0))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    with pytest.raises(InputError, match="of one rotor, but is neither"):
+        rj.linearise(plane(1.0))  # pyright: ignore[reportArgumentType]
+
+
 def test_a_history_faster_than_the_steps_is_warned_of(level):
     t, columns = np.array([0.0, 0.1, 0.104, 1.0]), np.zeros((4, len(COLUMNS)))
     columns[2:, 2], columns[:, -1] = 1.0, 100.0

