@@ -31,7 +31,8 @@ from rotorjax.wake.settings import WakeSettings
 
 class CoupledWake(eqx.Module):
     """Parameters p of a rotor in its free wake, all leaves differentiable. ground: in level axes, or None for none.
-    surfaces: in level axes about the place from which the hub's `RotorInputs.place` counts.
+    surfaces: in level axes about the place from which the hub's `RotorInputs.place` counts. gust (2,): of
+    `wake.model.Flight`, or None.
 
     The state's inflow is a `WakeState` of K = B slices, blade 0 first. Climb comes from the hub's motion, not from the
     operating point.
@@ -43,6 +44,7 @@ class CoupledWake(eqx.Module):
     ground: Plane | None
     settings: WakeSettings
     surfaces: Solid | None = None
+    gust: Float[Array, "2"] | None = None
 
     @property
     def edges(self) -> Float[Array, " R+1"]:
@@ -95,6 +97,7 @@ def model_of(u: RotorInputs, blades: BladesAt, p: CoupledWake) -> FreeWake:
         speed=u.omega,
         lag=blades.lag,
         lag_rate=blades.lag_rate,
+        gust=p.gust,
     )
     model = eqx.tree_at(lambda m: m.flight, p._rigid, flight, is_leaf=lambda v: v is None)
     if p.ground is not None and u.turn is not None:

@@ -59,7 +59,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     """Models of a trimmed rotor, at one place or several."""
     from rotorjax.commands.arguments import introduce_flights
     from rotorjax.io.atomic import make_folder
-    from rotorjax.linearisation import flight, schedule, trim_output
+    from rotorjax.linearisation import flight, identify, schedule, trim_output
     from rotorjax.trim.run import Result
 
     usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
@@ -71,17 +71,20 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     introduce_flights(requests)
     with _progress_bar() as progress:
         found = schedule.flights(requests, wanted, progress)
-    lost = [one for one in found if isinstance(one, Result)]
-    known = [one for one in found if not isinstance(one, Result)]
+        lost = [one for one in found if isinstance(one, Result)]
+        known = [one for one in found if not isinstance(one, Result)]
+        progress("identified inflow", 0.0)
+        small = identify.of_flights(known)
     if len(requests) == 1:
         for one in known:
             trim_output.write(one, out, chosen.time)
     else:
         schedule.write(known, out, chosen.time)
+    identify.write(small, out)
     for one in lost:
         where = "" if one.request.height is None else f", height {one.request.height:g}"
         print(f"advance ratio {one.request.advance:g}{where}: not converged: {one.trimmed.outcome.why}")
-    print("\n".join([*map(trim_output.lines, known), f"written: {out}"]))
+    print("\n".join([*map(trim_output.lines, known), *identify.lines(small), f"written: {out}"]))
     return 1 if lost else 0
 
 

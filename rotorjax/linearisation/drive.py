@@ -1,11 +1,13 @@
 """What drives a linear rotor, by name: Eq. 11's inputs, the ground, and gusts.
 
 A uniform gust moves the air as the hub's own velocity would move it the other way; with a hub that does not turn that
-is exact to first order, inertia included. A sinusoidal one belongs to the inflow at the blades (`Gusty`).
+is exact to first order, inertia included. A sinusoidal one belongs to the inflow at the blades (`Gusty`), and in a free
+wake to its nodes too (`wake.model.Flight`); it stands still while the blades pass, so that with it not even a hover is
+time-invariant.
 """
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import equinox as eqx
@@ -31,6 +33,8 @@ UNITS = {
     "height": "R",
 }
 """Unit of every input that some model has."""
+WAVES = ("gust_aft", "gust_starboard")
+"""Those that change with the azimuth seen from any blade."""
 
 
 class Gusty(InflowModel):
@@ -58,16 +62,19 @@ def drive_of(hub: RotorInputs, p: Coupled) -> Drive:
     """Every input that a rotor has, with its value: `RotorInputs`' own names, then
 
     gust_u, gust_v, gust_w: velocity of the air over ΩR, forward, to starboard, down. gust_aft, gust_starboard: of
-    `Gusty`. slope: of the ground (rad). Height and slope are there where the model has ground, height and slope.
+    `Gusty`, or a free wake's. slope: of the ground (rad). Height and slope are there where the model has them.
     """
     zero = jnp.zeros_like(hub.u)
     found = {field.name: getattr(hub, field.name) for field in fields(hub)}
     found = {name: value for name, value in found.items() if value is not None}
-    found |= dict.fromkeys(("gust_u", "gust_v", "gust_w"), zero)
-    if isinstance(p, CoupledRotor):
-        found |= dict.fromkeys(("gust_aft", "gust_starboard"), zero)
+    found |= dict.fromkeys(("gust_u", "gust_v", "gust_w", *WAVES), zero)
     where = _slope(p)
     return found if where is None else found | {"slope": where(p)}
+
+
+def lasting(u: Drive) -> Drive:
+    """Inputs that leave a hover time-invariant: all but WAVES."""
+    return {name: value for name, value in u.items() if name not in WAVES}
 
 
 def driven(u: Drive, p: Coupled) -> tuple[RotorInputs, Coupled]:
@@ -79,6 +86,8 @@ def driven(u: Drive, p: Coupled) -> tuple[RotorInputs, Coupled]:
         p = eqx.tree_at(where, p, u["slope"])
     if isinstance(p, CoupledRotor):
         p = eqx.tree_at(lambda q: q.inflow, p, Gusty(p.inflow, u["gust_aft"], u["gust_starboard"]))
+    elif "gust_aft" in u:
+        p = replace(p, gust=jnp.stack([u["gust_aft"], u["gust_starboard"]]))
     return RotorInputs(**own | moved), p  # type: ignore[arg-type]
 
 

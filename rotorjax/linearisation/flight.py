@@ -10,7 +10,7 @@ from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import rotor, steps
 from rotorjax.linearisation.compact import check_order, compact, frequencies, gaps, kept_states
-from rotorjax.linearisation.drive import check_names, drive_of
+from rotorjax.linearisation.drive import check_names, drive_of, lasting
 from rotorjax.linearisation.found import LinearRotor, Wanted, flight_notes
 from rotorjax.linearisation.hover_flight import LinearHover, hovering
 from rotorjax.linearisation.modes import modes
@@ -56,7 +56,9 @@ def check(request: Request, wanted: Wanted) -> None:
     """Raise InputError for a flight, names, an order, harmonics or azimuths that cannot be, before any work."""
     p, hub, model = _before(request)
     blades = request.rotor.blades
-    check_names("inputs", wanted.inputs, rotor.drive_names(drive_of(hub, p)), model)
+    u = drive_of(hub, p)
+    u = lasting(u) if hovers_in_wake(request) else u
+    check_names("inputs", wanted.inputs, rotor.drive_names(u), model)
     check_names("outputs", wanted.outputs, rotor.output_names(p, request.height is not None), model)
     motions = len(kept_states(tuple(f"beta_{name}" for name in multiblade.names(blades))))
     check_order(wanted.order, 4 * motions)
@@ -104,7 +106,12 @@ def _before(request: Request) -> tuple[Coupled, RotorInputs, str]:
 def _check_in_wake(request: Request) -> None:
     """Raise InputError for a flight whose free wake has no linear model here."""
     if request.slope_deg:
-        way = "a level flight over it has no steady state" if request.advance else "take inflow 'vpbfsm'"
+        way = (
+            "a level flight over it comes nearer the ground, and a wake keeps what it met at other heights, so that "
+            "nothing repeats to be linear about; take inflow 'vpbfsm', which knows the height of the instant alone"
+            if request.advance
+            else "take inflow 'vpbfsm', or leave the thrust out for the free wake of rigid blades"
+        )
         raise InputError(
             f"Argument `slope` must be 0 for a linear model in the free wake, but is {request.slope_deg:g}: {way}"
         )

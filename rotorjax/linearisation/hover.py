@@ -243,10 +243,10 @@ def _derivatives(
 def products(
     function: "Flat", z: Array, psi: Array, u, p, along: Float[np.ndarray, "k N"], progress: Progress | None = None
 ) -> Float[np.ndarray, "k M"]:
-    """Rates and outputs along directions, CHUNK at a time by one program."""
-    passes = []
+    """Rates and outputs along directions, CHUNK at a time by one program, or as many as there are."""
+    passes, width = [], min(CHUNK, len(along))
     for k in range(0, len(along), CHUNK):
-        chunk = np.zeros((CHUNK, z.size))
+        chunk = np.zeros((width, z.size))
         chunk[: len(along[k : k + CHUNK])] = along[k : k + CHUNK]
         passes.append(np.asarray(pushed(function, z, psi, u, p, jnp.asarray(chunk))))
         if progress is not None:

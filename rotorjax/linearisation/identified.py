@@ -43,8 +43,15 @@ FLOOR = 0.05
 class Stepped(Protocol):
     """A linear model, or a hover's by wave number."""
 
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names."""
+        ...
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names."""
+        ...
 
     def step(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N q m"]:
         """Outputs after unit steps of the inputs."""

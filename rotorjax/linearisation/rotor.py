@@ -134,7 +134,8 @@ def _base_in_wake(found: TrimmedInWake) -> Base:
     parts = [SteadyState(x.rotor, _wakes(multiblade.inverse(x.psi, blades), x.inflow, start.p)) for x in states]
     whole = jax.tree.map(lambda *leaves: jnp.stack(leaves), *parts)
     orbit = make_orbit(0.0, whole, 2 * np.pi / blades, found.outcome)
-    return Base(marching(start.p), drive_of(start.inputs, start.p), orbit, "a free wake")
+    u = drive_of(start.inputs, start.p)
+    return Base(marching(start.p), drive.lasting(u) if count == 1 else u, orbit, "a free wake")
 
 
 def linear_rotor(
@@ -142,11 +143,12 @@ def linear_rotor(
 ) -> PeriodicModel:
     """Linearise about a converged trim: A(ψ), B(ψ), C(ψ), D(ψ) over a revolution.
 
-    inputs: of `drive.drive_of`, None for all. kept: outputs of `readings.readings`, None for all but section loads.
-    Raises InputError where the trim has not converged or a name is unknown.
+    inputs: of `drive.drive_of`; kept: outputs of `readings.readings`; None for those of `chosen_names`. Raises
+    InputError where the trim has not converged or a name is unknown.
     """
     start = jax.tree.map(lambda leaf: leaf[0], base.orbit.x)
     ins, outs = chosen_names(base, inputs, kept)
+    blades, steady = base.p.rotor.blades, base.steady and not set(ins) & set(drive.WAVES)
 
     def derivative(psi: Array, x: SteadyState) -> tuple[np.ndarray, np.ndarray]:
         return value_and_jacobian(_joint, (x, base.u), psi, base.p, chunk=chunk)
@@ -160,6 +162,7 @@ def linear_rotor(
         inputs=ins,
         outputs=outs,
         units=drive.UNITS,
+        nodes=-(-AZIMUTHS // blades) if base.steady and not steady else None,
         derivative=derivative,
     )
     names, units = state_names(start, base.p)
@@ -167,18 +170,21 @@ def linear_rotor(
         found, states=names, state_units=units, output_units=tuple(map(readings.unit_of, found.outputs)),
         notes=notes(base),
     )  # fmt: skip
-    return replace(found, period=2 * np.pi) if base.steady else unfolded(found, base.p.rotor.blades)
+    return replace(found, period=2 * np.pi) if steady else unfolded(found, blades)
 
 
 def chosen_names(
     base: Base, inputs: Sequence[str] | None, outputs: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of inputs and outputs, None for all but section loads. Raises InputError for one that is unknown."""
+    """Names of inputs and outputs, None for all but section loads and, of what is steady, `drive.WAVES`. Raises
+    InputError for one that is unknown.
+    """
     ins, outs = drive_names(base.u), output_names(base.p, "height" in base.u)
     check_names("inputs", inputs, ins, base.model)
     check_names("outputs", outputs, outs, base.model)
     usual = tuple(name for name in outs if not name.startswith(readings.LIFT))
-    return ins if inputs is None else tuple(inputs), usual if outputs is None else tuple(outputs)
+    all_ = tuple(name for name in ins if not (base.steady and name in drive.WAVES))
+    return all_ if inputs is None else tuple(inputs), usual if outputs is None else tuple(outputs)
 
 
 def drive_names(u: Drive) -> tuple[str, ...]:

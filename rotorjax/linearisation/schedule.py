@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
 from rotorjax.io import netcdf
-from rotorjax.io.atomic import make_folder, write_json
+from rotorjax.io.atomic import make_folder, write_json, write_text
 from rotorjax.linearisation import trim_output
 from rotorjax.linearisation.condensed import Condensed, aligned
 from rotorjax.linearisation.flight import LinearFlight, linearise_trim
@@ -35,7 +36,7 @@ def flights(requests: Sequence[Request], wanted: Wanted, progress: Progress | No
 
 
 def place(found: LinearFlight) -> float:
-    """Where a flight stands in a sweep over speed, or over height."""
+    """Where a flight stands in a sweep over speed."""
     return found.result.request.advance
 
 
@@ -79,7 +80,8 @@ def stitched(found: Sequence[LinearFlight], time: Time = "seconds") -> xr.Datase
 
 
 def write(found: Sequence[Found], folder: Path, time: Time = "seconds") -> None:
-    """Write flights as scheduled.nc, roots.png and .pdf, and linearise.json with the numbers of each.
+    """Write flights as scheduled.nc, README.md, roots (.png and .pdf, one for each height of several speeds), and
+    linearise.json with the numbers of each.
 
     Hovers in the free wake, whose states are others, go to folders of their own.
     """
@@ -89,13 +91,53 @@ def write(found: Sequence[Found], folder: Path, time: Time = "seconds") -> None:
     flown = [one for one in found if isinstance(one, LinearFlight)]
     if not flown:
         return
-    netcdf.write(folder / "scheduled.nc", stitched(flown, time))
-    over_height = len({place(one) for one in flown}) == 1
-    label = "height" if over_height else "advance ratio"
-    at = [float(one.result.request.height or np.inf) if over_height else place(one) for one in flown]
-    plotting.save(roots({value: one.modes for value, one in zip(at, flown, strict=True)}, label), folder / "roots")
+    data = stitched(flown, time)
+    netcdf.write(folder / "scheduled.nc", data)
+    for name, figure in pictures(flown).items():
+        plotting.save(figure, folder / name)
+    sizes = {"flights": len(flown), "states": data.sizes["state"], "time": data.attrs["time"]}
+    write_text(folder / "README.md", README.format(title=flown[0].result.request.rotor.name, **sizes))
     write_json(folder / "linearise.json", {"flights": [trim_output.summary(one) for one in flown]})
+
+
+def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
+    """Roots over speed, at one height each; over height where there is one speed. By the name of their file."""
+    speeds = sorted({place(one) for one in flown})
+    heights = sorted({_height(one) for one in flown})
+    if len(speeds) == 1:
+        over = {_height(one): one.modes for one in flown}
+        return {"roots": roots(over, "height over R", f"advance ratio {speeds[0]:g}")}
+    found = {}
+    for height in heights:
+        title = "out of ground effect" if np.isinf(height) else f"h = {height:g} R"
+        over = {place(one): one.modes for one in flown if _height(one) == height}
+        name = "roots" if len(heights) == 1 else f"roots_{_folder_of(None if np.isinf(height) else height)}"
+        found[name] = roots(over, "advance ratio", title)
+    return found
+
+
+def _height(found: LinearFlight) -> float:
+    """Over R, infinite out of ground effect."""
+    return np.inf if found.result.request.height is None else float(found.result.request.height)
 
 
 def _folder_of(height: float | None) -> str:
     return "free_air" if height is None else f"height_{height:g}"
+
+
+README = """# {title}: linear models of {flights} flights
+
+`scheduled.nc` holds A, B, C, D and the trim values x0, u0, y0 of each flight along `flight`: {states} states of one
+meaning in all of them, with `advance_ratio` and `height` (NaN out of ground effect) beside them, and `growth` and
+`frequency` of every mode by name, per radian of azimuth. **Time is {time}**: poles are per unit of it.
+
+    import xarray, control
+    data = xarray.open_dataset("scheduled.nc")
+    one = data.isel(flight=0)
+    plant = control.ss(one.A.values, one.B.values, one.C.values, one.D.values)
+
+MATLAB: `A = ncread("scheduled.nc", "A")`, whose axes come in the other order: `permute(A, [2 1 3])`.
+
+Of flights in the free wake `inflow.txt` and `inflow.nc` have the inflow of three states that was fitted to each, for
+real-time flight dynamics: the equation and units stand at the head, a flight a row.
+"""

@@ -67,16 +67,18 @@ def sensitivity(
     where: Callable[[Design], Array],
     inputs: Sequence[str] = ("theta_0",),
     outputs: Sequence[str] = ("CT",),
+    way: Array | None = None,
 ) -> Sensitivity:
-    """Differentiate the mean model of a trim with an inflow model by a scalar parameter.
+    """Differentiate the mean model of a trim with an inflow model by a parameter.
 
-    where: picks it out of flight and rotor, as `lambda d: d[1].blade.offset`. Raises InputError where the trim has not
-    converged.
+    where: picks it out of flight and rotor, as `lambda d: d[1].blade.offset`. way: how its values go together where it
+    is an array, shaped like it, as radii for a linear twist; all alike by default. Raises InputError where the trim has
+    not converged.
     """
     require_converged(make_orbit(0.0, (found.z.rotor, found.z.inflow), 2 * np.pi, found.outcome))
     design = (found.flight, found.p)
     numbers = jax.tree.map(jnp.zeros_like, eqx.filter(design, eqx.is_inexact_array))
-    along = eqx.tree_at(where, numbers, jnp.ones_like(where(design)))
+    along = eqx.tree_at(where, numbers, jnp.ones_like(where(design)) if way is None else jnp.asarray(way))
     model, by = _matrices_along(design, along, found.residual, found.z, tuple(inputs), tuple(outputs))
     model, by = (Matrices(*map(np.asarray, part)) for part in (model, by))
     values, left, right = scipy.linalg.eig(model.a, left=True)  # type: ignore[misc]

@@ -68,17 +68,25 @@ def mode_content(mode: Mode) -> dict[str, Any]:
     }
 
 
-def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio") -> Figure:
-    """Exponents in the plane, one colour a flight; the modes of the one in the middle have their names beside them."""
+def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
+    """Exponents in the plane, one colour a flight; the modes of the one in the middle have their names beside them, and
+    a line goes with each mode from flight to flight.
+    """
+    paths: dict[str, list[complex]] = {}
+    for modes in by_value.values():
+        for mode in modes:
+            paths.setdefault(mode.name, []).append(mode.exponent)
     with style():
         figure = new_figure(8.5, 5.0)
         axes = figure.subplots()
         axes.axvline(0, color=INK, lw=0.8)
+        for values in paths.values():
+            axes.plot(np.real(values), np.imag(values), "-", color=INK, lw=0.6, alpha=0.4)
         for (value, modes), colour in zip(by_value.items(), series_colours(len(by_value)), strict=True):
             exponents = [mode.exponent for mode in modes]
             axes.plot(np.real(exponents), np.imag(exponents), "o", color=colour, ms=4.5, label=f"{label} {value:g}")
         _name(axes, list(by_value.values())[len(by_value) // 2])
-        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev")
+        axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=where)
         axes.legend(loc="upper left")
     return figure
 

@@ -259,9 +259,15 @@ def undisturbed(model: FreeWake, points: Float[Array, "N 3"], angle: Float[Array
     """Velocity of the air that no vortex moves, seen at points of the frame at `angle`: on a hub that turns, of each
     point its own.
     """
-    if model.flight is None or model.flight.turn is None:
-        return carried(model, angle)[None]
-    return carried(model, angle) - jnp.cross(rotate_about_shaft(model.flight.turn, -angle), points)
+    flight, air = model.flight, carried(model, angle)[None]
+    if flight is None:
+        return air
+    if flight.turn is not None:
+        air = air - jnp.cross(rotate_about_shaft(flight.turn, -angle), points)
+    if flight.gust is not None:
+        up = jnp.sin(jnp.pi * rotate_about_shaft(points, angle)[:, :2]) @ flight.gust
+        air = air + up[:, None] * np.array([0.0, 0.0, 1.0])
+    return air
 
 
 def _sharpened(model: FreeWake, control: Float[Array, "R 3"], segments: Segments) -> Float[Array, "R 3"]:

@@ -56,7 +56,8 @@ class Flight(eqx.Module):
     point's climb comes on top. hinge: e/R of the flap and lag hinges. flap, flap_rate (K,): of the blade of each slice
     (rad, per rad). cyclic (K,): its pitch beyond collective and twist (rad). turn (3,): angular velocity of the hub
     over Ω, hub frame; None for none. speed (): the rotor's speed over Ω, which stays the unit of velocities; None for
-    1. lag, lag_rate (K,): back (rad, per rad); both None for blades whose lag hinge is held.
+    1. lag, lag_rate (K,): back (rad, per rad); both None for blades whose lag hinge is held. gust (2,): the air goes up
+    by gust₀ sin πx + gust₁ sin πy over ΩR, in the hub frame; None for none.
     """
 
     wind: Float[Array, "3"]
@@ -68,6 +69,7 @@ class Flight(eqx.Module):
     speed: Float[Array, ""] | None = None
     lag: Float[Array, " K"] | None = None
     lag_rate: Float[Array, " K"] | None = None
+    gust: Float[Array, "2"] | None = None
 
     def of_slice(self, k: int | Int[Array, ""]) -> "Flight":
         """The motion of one slice's blade alone."""

@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.special import jv
 
 from rotorjax.coupled import coupled_rotor, still_state
 from rotorjax.inflow.momentum import Uniform
@@ -65,6 +66,14 @@ def test_flap_damping_and_the_gyroscopic_response():
     linear = average(model)
     slow = linear.response(np.array([1e-5]))[0, 0, 0]  # the air that is left alone has a pole at zero
     np.testing.assert_allclose(slow.real, 16 / LOCK, rtol=5e-4)
+
+
+def test_a_gust_of_one_wave_across_the_disk_flaps_the_blades():
+    """Of w = sin πx, x = r cos ψ, the first harmonic is 2 J₁(πr): β̈ = γ/2 ∫ r² w dr has γ J₂(π)/π of it, on average."""
+    base = at_rest(weightless(coupled_rotor(*plain(), NoInflow(jnp.ones(())), 96)))
+    model = linear_rotor(base, ["gust_aft", "gust_starboard"], ["CT"])
+    rows = [model.states.index(f"beta_{name}_rate") for name in ("1c", "1s")]
+    np.testing.assert_allclose(average(model).b[rows], LOCK * jv(2, np.pi) / np.pi * np.eye(2), atol=5e-4)
 
 
 def test_blades_without_air_have_their_own_frequencies(uh60):

@@ -36,7 +36,7 @@ from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
 from rotorjax.wake.start import prescribed
 
-INPUTS, OUTPUTS = ("theta_0", "theta_1c", "q", "w"), ("CT", "M", "beta_1s", "lambda_1c", "lift_0")
+INPUTS, OUTPUTS = ("theta_0", "theta_1c", "q", "w", "gust_aft"), ("CT", "M", "beta_1s", "lambda_1c", "lift_0")
 TINY = {**COARSE, "panels": 4, "closure_turns": 0, "closure_bundles": 0, "age_step_deg": 30.0, "near_wake_deg": 120.0}
 THICK = {
     "free_turns": 4 / 12,
@@ -169,6 +169,13 @@ def test_several_flights_make_one_scheduled_model(one, other):
         flights.append(flight.LinearFlight(asked, full, None, named, {}, part.model, (0,), none, none, none, wake))
     data = schedule.stitched(flights, "azimuth")
     assert list(data.advance_ratio.values) == [0.1, 0.2]
+    high = [
+        replace(one, result=SimpleNamespace(request=replace(one.result.request, height=h)))
+        for one in flights
+        for h in (1.0, 2.0)
+    ]
+    assert [*schedule.pictures(flights)] == [*schedule.pictures(high[:2])] == ["roots"]  # one speed: over height
+    assert [*schedule.pictures(high)] == ["roots_height_1", "roots_height_2"]
     np.testing.assert_allclose(data.frequency.sel(mode="coning"), [0.1, 0.2])
     for k, found in enumerate(flights):
         poles, own = (np.sort(np.linalg.eigvals(a).real) for a in (data["A"][k].values, found.full.a))
@@ -178,7 +185,7 @@ def test_several_flights_make_one_scheduled_model(one, other):
 
 BAD = {
     "`slope` must be 0 .* 3: a level flight": ({"advance": 0.15, "height": 1.0, "slope_deg": 3.0}, {}),
-    "has 'gust_aft'": ({"advance": 0.15}, {"inputs": ("gust_aft",)}),
+    "has 'gust_aft'": ({}, {"inputs": ("gust_aft",)}),
     "has 'clearance_aft'": ({"advance": 0.15}, {"outputs": ("clearance_aft",)}),
     "`order` must be at least 13": ({"advance": 0.15}, {"order": 12}),
     "`harmonics` must lie in": ({"advance": 0.15}, {"harmonics": 12}),

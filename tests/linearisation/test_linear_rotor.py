@@ -1,6 +1,7 @@
 """The linear rotor: blades seen from the hub in hover, closed forms, named modes, against the march, bad input."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import equinox as eqx
 import jax
@@ -9,7 +10,8 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.linearisation import flight, identified, steps
+from rotorjax.io import netcdf
+from rotorjax.linearisation import flight, identified, identify, steps
 from rotorjax.linearisation.compact import compact, frequencies, reduced
 from rotorjax.linearisation.found import OUTPUTS, Wanted
 from rotorjax.linearisation.modes import modes
@@ -228,6 +230,33 @@ def test_an_inflow_is_identified_from_steps(hover, linear, fast, in_flight):
         assert found[-1].error < 1e-4 < found[-1].pitt_peters_error
     with pytest.raises(InputError, match="has no lambda_0"):
         identified.identified(wake, replace(linear, states=tuple(f"x[{k}]" for k in range(linear.order))), start)
+
+
+def test_flights_in_the_wake_leave_a_table_of_their_inflows(hover, periodic, linear, tmp_path, monkeypatch):
+    """None of a flight with an inflow model, nor of one whose outputs are not all there."""
+    start = identify.Beside(linear, identified.own(hover))
+    monkeypatch.setattr(identify, "beside", lambda request: start)
+    wake, other = (request("uh60", 0.00575, inflow, advance=0.2) for inflow in ("freewake", "pitt-peters"))
+    monkeypatch.setattr(
+        identify,
+        "identified",
+        lambda model, rotor, own, *where: identified.Identified(own, 0.1, own, 0.2, *where),
+    )
+    few = chosen(linear, INPUTS)
+    flights = [
+        SimpleNamespace(result=SimpleNamespace(request=asked), full=full, models={"periodic": periodic})
+        for asked, full in ((wake, linear), (other, linear), (wake, few))
+    ]
+    found = identify.of_flights(flights)
+    assert [(one.advance, one.height) for one in found] == [(0.2, np.inf)]
+    identify.write(found, tmp_path)
+    identify.write([], tmp_path / "none")
+    data = netcdf.read(tmp_path / "inflow.nc")
+    np.testing.assert_allclose(identified.interpolated(data, 0.2).mass, start.inflow.mass)
+    assert len((tmp_path / "inflow.txt").read_text().splitlines()) == 4
+    assert identify.lines(found) == [
+        "identified inflow at advance ratio 0.2: 10.0 % off over a revolution after a step, Pitt and Peters' own 20.0 %"
+    ]
 
 
 def test_an_identified_table_is_interpolated_in_speed_and_one_over_height():
