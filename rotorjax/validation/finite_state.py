@@ -144,5 +144,9 @@ def draw(
     return figure
 
 
-KNOWN = "At h = 0.75 the free wake has a fountain at the hub that sources on the plane cannot make."
+KNOWN = (
+    "At h = 0.75 the free wake has a fountain at the hub: the stagnation pressure that the outboard jet leaves on the "
+    "ground blows the inboard air back, which has little total head. A flow without vorticity has one head: within "
+    "0.5 R the difference is 0.34, outside 0.12."
+)
 CASE = ValidationCase(NAME, "The finite-state model", points, compare, KNOWN)
