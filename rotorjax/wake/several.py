@@ -123,23 +123,11 @@ def several_wakes(
     >>> pair.slices, pair.senses.tolist()
     (1, [1.0, -1.0])
     """
-    if not isinstance(rotor, Rotor):
-        raise refuse(
-            "rotor", "be one rotor, the kind that all are of (collectives, thrusts and senses may differ)", shown(rotor)
-        )
-    place = np.array(places, float)
-    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 1 or not np.all(np.isfinite(place)):
-        raise refuse("places", "be finite and of shape (N, 3)", f"of shape {place.shape}")
-    count = len(place)
-    sense = np.array([1 - 2 * (i % 2) for i in range(count)] if senses is None else senses, float)
-    if sense.shape != (count,) or not np.all(np.abs(sense) == 1):
-        raise refuse("senses", f"hold {count} numbers, 1 (counter-clockwise) or -1", shown(senses))
-    _check_apart(place)
-    _check_ground(place, ground)
+    place, sense = _arranged(rotor, places, senses, ground)
     if surfaces is not None:
         check_surfaces(surfaces, operating)
         settings = among_settings() if settings is None else settings
-    pitch = operating.collective * 180 / np.pi if collectives_deg is None else collectives_deg
+    count, pitch = len(place), operating.collective * 180 / np.pi if collectives_deg is None else collectives_deg
     models = [
         _over(free_wake(rotor, _pitched(operating, angle), _under(ground, at), settings), surfaces, at)
         for angle, at in zip(_each("collectives_deg", pitch, count), place, strict=True)
@@ -155,6 +143,26 @@ def several_wakes(
         surfaces=None if surfaces is None else solid(surfaces, ground),
         slices=1 if shared else models[0].settings.azimuths,
     )
+
+
+def _arranged(
+    rotor: Rotor, places: Sequence[Sequence[float]], senses: Sequence[int] | None, ground: Plane | None
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
+    """Places and senses of the rotors, checked."""
+    if not isinstance(rotor, Rotor):
+        raise refuse(
+            "rotor", "be one rotor, the kind that all are of (collectives, thrusts and senses may differ)", shown(rotor)
+        )
+    place = np.array(places, float)
+    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 1 or not np.all(np.isfinite(place)):
+        raise refuse("places", "be finite and of shape (N, 3)", f"of shape {place.shape}")
+    count = len(place)
+    sense = np.array([1 - 2 * (i % 2) for i in range(count)] if senses is None else senses, float)
+    if sense.shape != (count,) or not np.all(np.abs(sense) == 1):
+        raise refuse("senses", f"hold {count} numbers, 1 (counter-clockwise) or -1", shown(senses))
+    _check_apart(place)
+    _check_ground(place, ground)
+    return place, sense
 
 
 def _each(name: str, values: ArrayLike, count: int) -> Float[Array, " N"]:
