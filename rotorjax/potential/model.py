@@ -16,7 +16,7 @@ and the model carries it (`Settings`); `finite_state_model(printed=True)` is the
 | ground_in_mass_flow | V_T, V̄ of the inflow that the disk has | V = √(C_T/2), the ground left out |
 | slope | "tilted": sources where the plane is | "sheared": at the depth under each point (Eq. 9) |
 | wake | `contraction()`: it narrows to R/√2 | None: a cylinder |
-| wake_edge | "free": gives way as a jet's, tilts fade on the way up (`potential.wake_edge`) | "rigid" |
+| wake_edge | "free" over a whole plane: gives way as a jet's, tilts fade (`potential.wake_edge`) | "rigid" |
 | mass_flow | "harmonics": V_T, and V̄ for harmonics | "paper": V̄ = 2V for all but the first state (Eq. 4) |
 
 Lengths over R, velocities over ΩR, hub frame (x aft, y to starboard, z up); inflow positive down.
@@ -180,7 +180,8 @@ def finite_state_model(
     (`rotorjax.region`, best with ground_harmonics 6 and ground_radial_terms 5); ground_radius: of the ground disk.
     Raises InputError where a count or a setting is not allowed.
     """
-    chosen: dict[str, Any] = {**(PRINTED if printed else _default(surfaces)), **settings}
+    whole = surfaces is None and settings.get("region") is None
+    chosen: dict[str, Any] = {**(PRINTED if printed else _default(whole)), **settings}
     _check(chosen, harmonics, ground_harmonics)
     _check_height(ground, chosen)
     if surfaces is not None:
@@ -200,15 +201,15 @@ def finite_state_model(
     )
 
 
-def _default(surfaces: Panels | None) -> Settings:
-    """The choices that agree best; beside surfaces the wake keeps its edge."""
+def _default(whole: bool) -> Settings:
+    """The choices that agree best. whole: whether the ground is a whole plane or none; else the wake keeps its edge."""
     return Settings(
         strengths="closed",
         ground_parity="odd",
         ground_in_mass_flow=True,
         slope="tilted",
         wake=contraction(),
-        wake_edge="free" if surfaces is None else "rigid",
+        wake_edge="free" if whole else "rigid",
         mass_flow="harmonics",
     )
 

@@ -14,7 +14,8 @@ nothing of that: they fade with the powers of the distance, all harmonics alike.
 
 of what they send is left. There is nothing to choose in it. On the ground it is 1, so that the plane stays closed, and
 the mean over the disk is untouched. Harmonics across which the sign stays, from the second on, are left as they are:
-on a slope they are of its second order.
+on a slope they are of its second order. Small is small against the jet: where an edge of the ground lets half of it by,
+the free wake's tilt is no less than that of sources under a rigid wake, which is then the default.
 
 In a wind the wake's foot lies h tan χ downwind, and what rises to the disk beside the wake meets no edge: of what is
 lost the share e^{−(h tan χ)²} is, within a tenth that of the disk that two circles so far apart have in common, and

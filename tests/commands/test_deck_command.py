@@ -67,7 +67,7 @@ def test_flight_over_an_edge_with_flapping_blades(tmp_path, capsys, monkeypatch)
     path = case(tmp_path, "dynamic", 4.0, "edge = [-1.4, 0.6]", "uh60")
     assert main(["deck", "--case", str(path), "--out", str(out)]) == 0
     data = netcdf.read(out / "history.nc")
-    assert data["cosine"].max() > 3e-4  # more inflow aft, where there is no deck
+    assert data["cosine"].max() > 0.001  # more inflow aft, where there is no deck
     assert data["uniform"][-1] < data["uniform"][0]
     assert float(data["ground_residual"].max()) < 0.05
     most = int(np.abs(data["beta_1s"].values).argmax())

@@ -12,6 +12,7 @@ from rotorjax.panels.shapes import wall
 from rotorjax.potential.contraction import contraction
 from rotorjax.potential.model import finite_state_model, ground_upflow, mean_inflow, steady_state, velocity, wake_over
 from rotorjax.potential.wake_edge import FADING, left_of_tilt
+from rotorjax.region import half_plane
 
 WAKE = contraction()
 SLOPE = plane(1.0, 20.0)
@@ -87,6 +88,13 @@ def test_it_has_derivatives_at_the_axis_the_rim_and_the_ground():
     for take in (jax.jacfwd, jax.jacrev):
         for slopes in jax.jit(take(flow, argnums=(0, 1)))(SLOPE.height, places):
             assert np.all(np.isfinite(slopes))
+
+
+def test_where_ground_ends_or_surfaces_stand_the_edge_is_rigid():
+    assert finite_state_model(SLOPE).wake_edge == "free"
+    assert finite_state_model(SLOPE, printed=True).wake_edge == "rigid"
+    assert finite_state_model(plane(1.0), region=half_plane(0.3)).wake_edge == "rigid"
+    assert finite_state_model(surfaces=wall(1.5, -1.0, 1.0)).wake_edge == "rigid"
 
 
 def test_an_edge_that_does_not_exist_or_beside_surfaces_is_refused():
