@@ -106,9 +106,8 @@ class FiniteStateInflow(InflowModel):
     def _in_wind(self, state: Float[Array, " M"], inputs: RotorInputs) -> FiniteStateModel:
         """The model whose wake contracts as the wind along the disk lets it, by momentum theory, and leans with it."""
         wind, first = edgewise(inputs), 2 / jnp.sqrt(3.0) * state[self.model.modes.index(0, 1)]
-        rest = (wind[0] == 0) & (wind[1] == 0)
-        speed = jnp.where(rest, 0.0, jnp.sqrt(jnp.where(rest, 1.0, wind @ wind)))
-        model = eqx.tree_at(lambda m: m.lean, self.model, speed / jnp.sqrt(first**2 + STILL))
+        lean = jnp.sqrt((wind @ wind + STILL) / (first**2 + STILL))
+        model = eqx.tree_at(lambda m: m.lean, self.model, lean)
         if model.wake is None:
             return model
         squares = jnp.stack([wind @ wind + (n * first) ** 2 + STILL for n in (1, 2)])  # of V_T at the disk, far below

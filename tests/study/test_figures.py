@@ -45,11 +45,9 @@ def test_contours_are_seen_from_above_with_the_mountain_at_the_right(merged):
 def test_curves_run_from_valley_to_mountain(merged):
     data = select(merged, Case(1.0, 30.0))
     assert data is not None
-    for model in ("free_wake", "vpbfsm", "exact_image"):
+    for model in ("free_wake", "printed", "exact_image"):  # of the default's tilt the made-up loads leave nothing
         x, values = across_disk(data, model, 1.0)
         assert np.all(np.diff(x[np.isfinite(x)]) >= 0)
-        if model == "vpbfsm":  # its edge gives way: less is left of the tilt than the made-up loads make
-            continue
         assert np.nanmean(values[x < -0.3]) > np.nanmean(values[x > 0.3])  # less inflow where the ground is nearer
 
 
