@@ -84,3 +84,9 @@ def test_what_ode_integrates_it_does_not_know():
 def test_files_import_in_no_circle():
     """Raises CycleError with the circle."""
     list(TopologicalSorter(imports()).static_order())
+
+
+def test_no_transform_of_xla():
+    # it may wait for ever on a CPU: rotorjax/ode/fourier.py
+    found = [path.name for path in PACKAGE.rglob("*.py") if "jnp.fft" in path.read_text(encoding="utf-8")]
+    assert not found

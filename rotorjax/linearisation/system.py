@@ -23,6 +23,7 @@ from jaxtyping import Array, Float
 from rotorjax.errors import InputError
 from rotorjax.linearisation.assembly import Assembly, assemble
 from rotorjax.linearisation.outputs import WakeOutputs, outputs
+from rotorjax.ode.fourier import half_coefficients
 from rotorjax.ode.labels import labels, select
 from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import PeriodicModel
@@ -66,7 +67,7 @@ class Base(NamedTuple):
         wave = weight * jnp.exp(1j * number * angle[:, None])
 
         def leaf(a: Array) -> Array:
-            return jnp.real(jnp.tensordot(wave, jnp.fft.rfft(a, axis=0), axes=1))
+            return jnp.real(jnp.tensordot(wave, half_coefficients(a), axes=1))
 
         return jax.tree.map(leaf, self.wake)
 

@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.coupled_wake import wake_air_loads
 from rotorjax.frames import rotate_about_shaft
+from rotorjax.ode.fourier import fourier_coefficients, fourier_values
 from rotorjax.rotor import flap_lag
 from rotorjax.rotor.flap_lag import Blade
 from rotorjax.rotor.hub import RotorInputs, turning_frame
@@ -126,9 +127,9 @@ def blade_defect(
     """Periodic answer of δ'' + DAMPING δ' + ν² δ to what is left of the flap and lag equations."""
     _, (angles, _), wanted = _motion(flap, lag, loads, p)
     number = jnp.asarray(harmonics(flap.shape[0]))[:, None]
-    left = jnp.fft.fft(wanted, axis=0) + number**2 * jnp.fft.fft(angles, axis=0)
+    left = fourier_coefficients(wanted) + number**2 * fourier_coefficients(angles)
     frequency = jnp.stack([flap_lag.flap_frequency(p.blade), flap_lag.lag_frequency(p.blade)])
-    return jnp.fft.ifft(left / (frequency**2 - number**2 + 1j * DAMPING * number), axis=0).real
+    return fourier_values(left / (frequency**2 - number**2 + 1j * DAMPING * number)).real
 
 
 def hub_moment(flap: Float[Array, " K"], lag: Float[Array, " K"], loads: AirLoads, p: WakeTrim) -> Float[Array, "3"]:
@@ -165,7 +166,7 @@ def _azimuths(flap: Float[Array, " K"]) -> Float[Array, " K"]:
 
 def _rate(angle: Float[Array, " K"]) -> Float[Array, " K"]:
     """∂/∂ψ, exact for every harmonic that K slices hold."""
-    return jnp.fft.ifft(1j * jnp.asarray(harmonics(angle.shape[0])) * jnp.fft.fft(angle)).real
+    return fourier_values(1j * jnp.asarray(harmonics(angle.shape[0])) * fourier_coefficients(angle)).real
 
 
 def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices: int, inflow: float) -> InWake:

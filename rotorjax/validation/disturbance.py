@@ -17,6 +17,7 @@ from jaxtyping import Array, Complex, Float
 
 from rotorjax.linearisation.system import outputs
 from rotorjax.linearisation.waves import Mode, Pairing, spectrum, wave_matrix
+from rotorjax.ode.fourier import fourier_coefficients
 from rotorjax.ode.trajectory import march
 from rotorjax.wake.dynamics import inputs_of, rhs
 from rotorjax.wake.model import FreeWake, WakeState
@@ -127,7 +128,7 @@ def _by_wave(states: WakeState, rest: WakeState):
     """Rms displacement (N, B) and flat deviation (N, B, n) of every wave number: Fourier sums over the blades."""
 
     def one(state):
-        apart = jax.tree.map(lambda a, b: jnp.fft.fft(a - b, axis=0, norm="forward"), state, rest)
+        apart = jax.tree.map(lambda a, b: fourier_coefficients(a - b) / len(a), state, rest)
         nodes = jnp.concatenate([apart.near.reshape(apart.near.shape[0], -1), apart.far.reshape(len(apart.far), -1)], 1)
         rms = jnp.sqrt(3 * jnp.mean(jnp.abs(nodes) ** 2, axis=1))
         return rms, jax.vmap(lambda a: ravel_pytree(a)[0])(apart)

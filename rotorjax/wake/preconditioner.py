@@ -12,6 +12,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex
 
+from rotorjax.ode.fourier import half_coefficients, half_values
 from rotorjax.wake.dynamics import inputs_of
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, evaluated, full_state, transported
 from rotorjax.wake.field import Velocities
@@ -29,9 +30,9 @@ class HarmonicInverse(eqx.Module):
     def __call__(self, v: Unknowns, x: Unknowns, model: FreeWake) -> Unknowns:
         """Return J⁻¹ v for unknowns of K slices; x and model are not looked at."""
         slices = v.near.shape[0]
-        solved = jnp.einsum("pij,pj->pi", self.inverse, jnp.fft.rfft(_rows(v), axis=0))
+        solved = jnp.einsum("pij,pj->pi", self.inverse, half_coefficients(_rows(v)))
         back = ravel_pytree(_first(v))[1]
-        return jax.vmap(back)(jnp.fft.irfft(solved, slices, axis=0))
+        return jax.vmap(back)(half_values(solved, slices))
 
 
 def harmonic_inverse(model: FreeWake, x: Unknowns, slices: int, found: Evaluation | None = None) -> HarmonicInverse:
@@ -90,9 +91,9 @@ def _jacobian(model: FreeWake, x: Unknowns, found: Evaluation, responses: Comple
         return _rows(jax.jvp(lambda e: transported(model, e), (here[1],), (change,))[1])
 
     states = jax.vmap(to_state)(jnp.eye(one.size))
-    response = jnp.einsum("pnim,cpm->cpni", responses, jnp.fft.rfft(states, axis=1))
-    columns = jax.vmap(to_unknowns)(states, jnp.fft.irfft(response, slices, axis=1))
-    return jnp.einsum("cpn->pnc", jnp.fft.rfft(columns, axis=1)) - jnp.eye(one.size)
+    response = jnp.einsum("pnim,cpm->cpni", responses, half_coefficients(states, axis=1))
+    columns = jax.vmap(to_unknowns)(states, half_values(response, slices, axis=1))
+    return jnp.einsum("cpn->pnc", half_coefficients(columns, axis=1)) - jnp.eye(one.size)
 
 
 def _first(tree):

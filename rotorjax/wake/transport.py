@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from rotorjax.ode.age_difference import five_point_upwind
+from rotorjax.ode.fourier import fourier_coefficients, fourier_values
 from rotorjax.wake.age_grid import AgeGrid
 
 ORDER = 4
@@ -69,7 +70,7 @@ def _solved(matrix: Complex[np.ndarray, "A A"] | Float[np.ndarray, "A A"], sourc
     inverse = _inverse(matrix, source.shape[0], damping)
     if source.shape[0] == 1:  # the same at all azimuths
         return source @ (inverse[0] if np.iscomplexobj(matrix) else inverse[0].real).T
-    return jnp.fft.ifft(jnp.einsum("kij,kfj->kfi", inverse, jnp.fft.fft(source, axis=0)), axis=0)
+    return fourier_values(jnp.einsum("kij,kfj->kfi", inverse, fourier_coefficients(source)))
 
 
 def _inverse(matrix: np.ndarray, slices: int, damping: float) -> Complex[np.ndarray, "K A A"]:
@@ -97,4 +98,4 @@ def lag(gamma: Float[Array, "K R"], time_constant: Float[Array, ""]) -> Float[Ar
     if gamma.shape[0] == 1:
         return gamma
     p = jnp.asarray(harmonics(gamma.shape[0]))[:, None]
-    return jnp.fft.ifft(jnp.fft.fft(gamma, axis=0) / (1 + 1j * p * time_constant), axis=0).real
+    return fourier_values(fourier_coefficients(gamma) / (1 + 1j * p * time_constant)).real
