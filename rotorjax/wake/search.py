@@ -39,6 +39,9 @@ MOST, MOST_SLICES = 10, 16
 smaller step of the continuation.
 """
 
+CLOSING, MORE = 0.25, 5
+"""Share of the residual that the last of these iterations leaves where Newton's method closes in: it gets MORE then."""
+
 DISTANT = 2.0
 """Height over R at which a prescribed wake is near enough to a wake over ground."""
 
@@ -165,7 +168,16 @@ class Search:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
         linear = replace(METHOD, precondition=self.inverse, restart=effort)
         most = MOST if x.near.shape[0] == 1 else MOST_SLICES
-        return newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
+        found = newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
+        if found.converged or found.iterations < most or found.residuals[-1] > CLOSING * found.residuals[-2]:
+            return found
+        last = newton(told, found.x, model, linear=linear, tol=tol, max_iterations=MORE, memory=found.memory)
+        return replace(
+            last,
+            iterations=found.iterations + last.iterations,
+            residuals=(*found.residuals, *last.residuals[1:]),
+            wall_time=found.wall_time + last.wall_time,
+        )
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
         """Make the preconditioner for a wake that is not axisymmetric."""
