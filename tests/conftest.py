@@ -7,7 +7,9 @@ the commands that the tests start, which get it through the environment.
 """
 
 import gc
+import itertools
 import os
+import threading
 from pathlib import Path
 
 from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
@@ -21,10 +23,12 @@ os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's
 
 import jax
 import pytest
+from jax._src.interpreters import mlir
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 MOST_MAPPINGS = 15_000  # about 3 GB of programs and what they hold
 SHORTEST = 0.3  # seconds of compilation that are worth a file
+LOWERED_TOGETHER = 200  # programs; a context keeps what it has seen, constants too
 MUCH_RUN = {
     "xla_backend_optimization_level": 1,
     "xla_llvm_disable_expensive_passes": False,
@@ -48,6 +52,30 @@ def pytest_collection_modifyitems(items):
         return 0 if item.path.name == "test_documents.py" else 1 if item.path in slow else 2
 
     items.sort(key=order)
+
+
+def lower_together():
+    """Many programs are lowered in one MLIR context: jax makes one for each, which takes longer than a small program.
+
+    One for each is still made within another's lowering and in other threads. Of jax's own parts, and so only where it
+    has them.
+    """
+    make = getattr(mlir, "make_ir_context", None)
+    if make is None:
+        return
+    uses, shared = itertools.count(), [None]
+
+    def context():
+        if mlir.ir.Context.current is not None or threading.current_thread() is not threading.main_thread():
+            return make()
+        if next(uses) % LOWERED_TOGETHER == 0:
+            shared[0] = make()
+        return shared[0]
+
+    mlir.make_ir_context = context
+
+
+lower_together()
 
 
 @pytest.fixture(autouse=True, scope="session")
