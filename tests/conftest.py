@@ -16,11 +16,20 @@ from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
 # XLA's older way to write fused loops and LLVM's first level: the same sums, and half to compile; read when jax starts.
-# Level 0 halves that again, but its programs run three times as long: for all but the study and a wake's linear map
-os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {WITHOUT_FREE_WAKE} --xla_backend_optimization_level=1"
+# Level 0 halves that again, but its programs run three times as long: for all but the study and what runs long. A
+# program is one module for LLVM and not 32: a third less, where the workers keep all cores busy
+os.environ["XLA_FLAGS"] = " ".join(
+    [
+        os.environ.get("XLA_FLAGS", ""),
+        WITHOUT_FREE_WAKE,
+        "--xla_cpu_parallel_codegen_split_count=1" if HAS_OLDER_WAY else "",
+        "--xla_backend_optimization_level=1",
+    ]
+)
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's own hints are no errors
 
+import equinox as eqx
 import jax
 import pytest
 from jax._src.interpreters import mlir
@@ -79,11 +88,16 @@ lower_together()
 
 
 @pytest.fixture(autouse=True, scope="session")
-def products_run_fast():
-    """The linear map of a residual, which GMRES applies some hundred times in a solve, is compiled to be run."""
-    from rotorjax.ode import linear
+def what_runs_long_runs_fast():
+    """Compiled to be run: the linear map of a residual, which GMRES applies some hundred times in a solve, marches, and
+    the ground's response at the many places of a table.
+    """
+    from rotorjax.ode import linear, trajectory
+    from rotorjax.potential import ground_table
 
     linear._product = jax.jit(linear._product.__wrapped__, compiler_options=MUCH_RUN)
+    trajectory._stretch = eqx.filter_jit(trajectory._stretch.__wrapped__, compiler_options=MUCH_RUN)
+    ground_table._over_planes = eqx.filter_jit(ground_table._over_planes.__wrapped__, compiler_options=MUCH_RUN)
 
 
 @pytest.fixture(autouse=True, scope="module")
