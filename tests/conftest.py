@@ -7,9 +7,8 @@ the commands that the tests start, which get it through the environment.
 """
 
 import gc
-import itertools
+import importlib
 import os
-import threading
 from pathlib import Path
 
 from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
@@ -29,19 +28,13 @@ os.environ["XLA_FLAGS"] = " ".join(
 os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's own hints are no errors
 
-import equinox as eqx
+import compiling
 import jax
 import pytest
-from jax._src.interpreters import mlir
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 MOST_MAPPINGS = 15_000  # about 3 GB of programs and what they hold
 SHORTEST = 0.3  # seconds of compilation that are worth a file
-LOWERED_TOGETHER = 200  # programs; a context keeps what it has seen, constants too
-MUCH_RUN = {
-    "xla_backend_optimization_level": 1,
-    "xla_llvm_disable_expensive_passes": False,
-} | ({"xla_cpu_use_fusion_emitters": True} if HAS_OLDER_WAY else {})
 
 gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other
 
@@ -51,6 +44,7 @@ jax.config.update("jax_compilation_cache_dir", CACHE)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", SHORTEST)
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", CACHE)
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", str(SHORTEST))
+compiling.lower_together()
 
 
 def pytest_collection_modifyitems(items):
@@ -63,41 +57,12 @@ def pytest_collection_modifyitems(items):
     items.sort(key=order)
 
 
-def lower_together():
-    """Many programs are lowered in one MLIR context: jax makes one for each, which takes longer than a small program.
-
-    One for each is still made within another's lowering and in other threads. Of jax's own parts, and so only where it
-    has them.
-    """
-    make = getattr(mlir, "make_ir_context", None)
-    if make is None:
-        return
-    uses, shared = itertools.count(), [None]
-
-    def context():
-        if mlir.ir.Context.current is not None or threading.current_thread() is not threading.main_thread():
-            return make()
-        if next(uses) % LOWERED_TOGETHER == 0:
-            shared[0] = make()
-        return shared[0]
-
-    mlir.make_ir_context = context
-
-
-lower_together()
-
-
 @pytest.fixture(autouse=True, scope="session")
 def what_runs_long_runs_fast():
-    """Compiled to be run: the linear map of a residual, which GMRES applies some hundred times in a solve, marches, and
-    the ground's response at the many places of a table.
-    """
-    from rotorjax.ode import linear, trajectory
-    from rotorjax.potential import ground_table
-
-    linear._product = jax.jit(linear._product.__wrapped__, compiler_options=MUCH_RUN)
-    trajectory._stretch = eqx.filter_jit(trajectory._stretch.__wrapped__, compiler_options=MUCH_RUN)
-    ground_table._over_planes = eqx.filter_jit(ground_table._over_planes.__wrapped__, compiler_options=MUCH_RUN)
+    """Compiled to be run, not to be compiled fast."""
+    for name, _, _ in compiling.RUN_LONG:
+        importlib.import_module(name)
+    compiling.to_be_run()
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import nbformat
 import pytest
 from browser import needs_browser, seen
+from compiling import KERNEL
 from nbclient import NotebookClient
 
 import rotorjax as rj
@@ -94,10 +95,18 @@ def test_the_main_command_works_from_a_fresh_clone(clone, studied):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the client's event loop, not of ours
 def test_notebook_runs(path, studied, tmp_path):
-    """From top to bottom; where a notebook takes up the study, it finds the cases that the main command left."""
+    """From top to bottom, compiled as the tests are; where a notebook takes up the study, it finds the cases that the
+    main command left.
+    """
     shutil.copytree(studied[1] / "cases", tmp_path / "out" / "cases")
     notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+    client = NotebookClient(
+        notebook,
+        timeout=900,
+        kernel_name="python3",
+        resources={"metadata": {"path": tmp_path}},
+        extra_arguments=[f"--IPKernelApp.exec_lines={[KERNEL.format(tests=str(Path(__file__).parent))]!r}"],
+    )
     client.execute()
     EXECUTED.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, EXECUTED / path.name)
