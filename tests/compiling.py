@@ -15,11 +15,10 @@ MUCH_RUN = {
     "xla_backend_optimization_level": 1,
     "xla_llvm_disable_expensive_passes": False,
 } | ({"xla_cpu_use_fusion_emitters": True} if HAS_OLDER_WAY else {})
-# a residual's linear map, which GMRES applies some hundred times in a solve; marches; the ground at a table's places
+# a residual's linear map, which GMRES applies some hundred times in a solve, and marches
 RUN_LONG = [
     ("rotorjax.ode.linear", "_product", jax.jit),
     ("rotorjax.ode.trajectory", "_stretch", eqx.filter_jit),
-    ("rotorjax.potential.ground_table", "_over_planes", eqx.filter_jit),
 ]
 KERNEL = """
 import sys
