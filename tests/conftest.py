@@ -33,8 +33,8 @@ import jax
 import pytest
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
-MOST_MAPPINGS = 15_000  # about 3 GB of programs and what they hold
-SHORTEST = 0.3  # seconds of compilation that are worth a file
+MOST_MAPPINGS = 20_000  # about 3 GB of programs and what they hold
+SHORTEST = 0.1  # seconds of compilation that are worth a file
 
 gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other
 
