@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 import nbformat
 import pytest
 from browser import needs_browser, seen
+from compiling import KERNEL
 from nbclient import NotebookClient
 
 import rotorjax as rj
@@ -45,10 +46,12 @@ def clone(tmp_path_factory):
     return folder
 
 
-def sh(text, folder):
-    """With programs compiled as XLA_FLAGS say: the study runs longer than it compiles."""
-    left_out = ("PYTHON", "VIRTUAL_ENV", "PYTEST", "JAX_DISABLE_MOST_OPTIMIZATIONS")
-    clean = {k: v for k, v in os.environ.items() if not k.startswith(left_out)}
+def sh(text, folder, *left_out):
+    """Without what Python, pytest and `left_out` brought in. Modules are compiled where they are imported, not all that
+    pip lays down.
+    """
+    left_out = ("PYTHON", "VIRTUAL_ENV", "PYTEST", *left_out)
+    clean = {k: v for k, v in os.environ.items() if not k.startswith(left_out)} | {"PIP_NO_COMPILE": "no"}
     return subprocess.run(["sh", "-euc", text], cwd=folder, env=clean, capture_output=True, text=True, check=False)
 
 
@@ -69,8 +72,8 @@ def test_ci_runs_the_readmes_test_command():
 
 @pytest.fixture(scope="module")
 def studied(clone):
-    """What the main command prints, and its folder `out`."""
-    return sh(STUDY, clone), clone / "out"
+    """What the main command prints, and its folder `out`. The study runs longer than its programs are compiled."""
+    return sh(STUDY, clone, "JAX_DISABLE_MOST_OPTIMIZATIONS"), clone / "out"
 
 
 @pytest.mark.slow
@@ -92,10 +95,18 @@ def test_the_main_command_works_from_a_fresh_clone(clone, studied):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the client's event loop, not of ours
 def test_notebook_runs(path, studied, tmp_path):
-    """From top to bottom; where a notebook takes up the study, it finds the cases that the main command left."""
+    """From top to bottom, compiled as the tests are; where a notebook takes up the study, it finds the cases that the
+    main command left.
+    """
     shutil.copytree(studied[1] / "cases", tmp_path / "out" / "cases")
     notebook = nbformat.read(path, as_version=4)
-    client = NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}})
+    client = NotebookClient(
+        notebook,
+        timeout=900,
+        kernel_name="python3",
+        resources={"metadata": {"path": tmp_path}},
+        extra_arguments=[f"--IPKernelApp.exec_lines={[KERNEL.format(tests=str(Path(__file__).parent))]!r}"],
+    )
     client.execute()
     EXECUTED.mkdir(parents=True, exist_ok=True)
     nbformat.write(notebook, EXECUTED / path.name)

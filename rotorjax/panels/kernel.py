@@ -43,6 +43,7 @@ class Frames(NamedTuple):
     y: Float[Array, "P 4"]
 
 
+@jax.jit
 def frames(corners: Float[Array, "P 4 3"]) -> Frames:
     """Axes and corners of panels."""
     origin = jnp.mean(corners, axis=1)

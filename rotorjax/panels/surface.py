@@ -60,22 +60,26 @@ class Panels(eqx.Module):
         return Panels(jnp.concatenate([self.corners, other.corners]))
 
     @property
+    @jax.jit
     def halves(self) -> Float[Array, "2 P 3"]:
         """Vector areas of the two triangles that a panel is made of."""
         a, b, c, d = jnp.moveaxis(self.corners, 1, 0)
         return 0.5 * jnp.stack([jnp.cross(b - a, c - a), jnp.cross(c - a, d - a)])
 
     @property
+    @jax.jit
     def areas(self) -> Float[Array, " P"]:
         """Areas over R²."""
         return jnp.linalg.norm(jnp.sum(self.halves, axis=0), axis=-1)
 
     @property
+    @jax.jit
     def normals(self) -> Float[Array, "P 3"]:
         """Unit normals, into the air."""
         return jnp.sum(self.halves, axis=0) / self.areas[:, None]
 
     @property
+    @jax.jit
     def middles(self) -> Float[Array, "P 3"]:
         """Centroids: where no air goes through."""
         share = jnp.sum(self.halves * self.normals, axis=-1) / self.areas

@@ -20,10 +20,12 @@ distance.
 """
 
 from collections.abc import Callable
+from functools import partial
 from math import sqrt
 from typing import NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -137,6 +139,7 @@ def _means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
     return jnp.where(modes.m == 0, _tube(pressure_functions, modes, jnp.asarray(points), wake) @ (nu * weight), 0.0)
 
 
+@jax.jit
 def disk_means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
     """Return the area-weighted mean inflow of each mode's unit state: 2/√3 of the first, as in the cylinder."""
     means = _means(modes, wake)
@@ -144,6 +147,7 @@ def disk_means(modes: ModeTable, wake: Contraction) -> Float[Array, " M"]:
     return 2 / sqrt(3) / first * means
 
 
+@jax.jit
 def disk_flow(
     modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"], wake: Contraction
 ) -> Float[Array, "M ..."]:
@@ -152,6 +156,7 @@ def disk_flow(
     return near_flow(pressure_functions, modes, points, wake)
 
 
+@partial(jax.jit, static_argnames="functions")
 def near_flow(
     functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
 ) -> Float[Array, "..."]:
@@ -160,6 +165,7 @@ def near_flow(
     return amplitude.reshape((-1,) + (1,) * (points.ndim - 1)) * _tube(functions, modes, points, wake)
 
 
+@partial(jax.jit, static_argnames="functions")
 def far_flow(
     functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
 ) -> Float[Array, "..."]:
@@ -171,6 +177,7 @@ def far_flow(
     return jnp.where(odd, narrow, functions(modes, points))
 
 
+@partial(jax.jit, static_argnames="functions")
 def wake_flow(
     functions: Functions, modes: ModeTable, points: Float[Array, "*N 3"], wake: Contraction
 ) -> Float[Array, "..."]:

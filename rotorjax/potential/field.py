@@ -10,6 +10,7 @@ holds only with the adjoint terms at ψ + π; this form needs no such turn. It i
 v_B = 0 for pressure modes (tests/potential/test_field.py integrates along streamlines).
 """
 
+from functools import partial
 from math import factorial, log, pi, sqrt
 
 import jax
@@ -45,12 +46,14 @@ def _radial(pairs: Pairs, at: Ellipsoidal) -> Float[Array, "L ..."]:
     return legendre_p(pairs, at.nu) * legendre_q(pairs, at.eta)
 
 
+@jax.jit
 def pressure_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
     """Return Φ_n^m = P̄_n^m(ν) Q̄_n^m(iη) {cos, sin} mψ at hub-frame points over R (Eqs. 6, 29)."""
     at = ellipsoidal(points)
     return _by_mode(modes, _radial(modes.pairs, at), at)
 
 
+@jax.jit
 def disk_functions(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) -> Float[Array, "M ..."]:
     """Return P̄_n^m {cos, sin} mψ on the disk's upper face at hub-frame stations (x, y), zero outside the disk.
 
@@ -92,6 +95,7 @@ def _diagonal_remainder(r: int, at: Ellipsoidal) -> Float[Array, "*N"]:
     return scale * total / ((1 + at.nu) ** r * (1 + at.eta**2) ** (r / 2))
 
 
+@partial(jax.jit, static_argnames="outer_radius")
 def velocity_potentials(
     modes: ModeTable, points: Float[Array, "*N 3"], outer_radius: float = 1e3
 ) -> Float[Array, "M ..."]:
@@ -118,6 +122,7 @@ def velocity_potentials(
     return _by_mode(modes, rows, at)
 
 
+@jax.jit
 def velocity_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
     """Return the velocity (hub frame) of each mode's unit state on and above the disk: ∇Ψ, the axial one being −Φ.
 
@@ -143,6 +148,7 @@ def _mirrored(points: Float[Array, "*N 3"]) -> Float[Array, "*N 3"]:
     return jnp.concatenate([points[..., :2], jnp.abs(points[..., 2:])], axis=-1)
 
 
+@jax.jit
 def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
     """Return the downward velocity of each mode's unit state at any hub-frame points."""
     above = pressure_functions(modes, _mirrored(points))
@@ -153,6 +159,7 @@ def axial_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Arr
     return jnp.where(points[..., 2] >= 0, above, below)
 
 
+@jax.jit
 def column_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "M ..."]:
     """Return the part of `axial_functions` that the air of the wake's column has alone: 2P̄ of odd modes, below.
 
@@ -162,6 +169,7 @@ def column_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Ar
     return jnp.where(modes.odd.reshape((-1,) + (1,) * (points.ndim - 1)), inside, 0.0)
 
 
+@jax.jit
 def field_functions(modes: ModeTable, points: Float[Array, "*N 3"]) -> Float[Array, "3 M *N"]:
     """Return the velocity (hub frame) of each mode's unit state at any hub-frame points."""
     above = velocity_functions(modes, _mirrored(points))[:2]

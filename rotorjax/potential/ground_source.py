@@ -82,6 +82,7 @@ def depth(ground: Plane, x: Float[Array, "*N"]) -> Float[Array, "*N"]:
     return ground.height - x * jnp.tan(ground.slope)
 
 
+@jax.jit
 def rotor_on_ground(
     modes: ModeTable,
     ground: Plane,
@@ -99,6 +100,7 @@ def rotor_on_ground(
     return jnp.cos(ground.slope) * far_flow(axial_functions, modes, points, wake)
 
 
+@jax.jit
 def ground_on_rotor(
     modes: ModeTable, ground: Plane, correction: Correction, points: Float[Array, "*N 3"]
 ) -> Float[Array, "G ..."]:
@@ -111,6 +113,7 @@ def ground_on_rotor(
     return functions * jnp.where(diagonal, correction.factor(ellipsoidal(above).eta), 1.0)
 
 
+@jax.jit
 def sheet_flow(
     modes: ModeTable, ground: Plane, points: Float[Array, "*N 3"], sheet: DiskQuadrature = SHEET
 ) -> Float[Array, "M ..."]:
@@ -133,6 +136,7 @@ def sheet_flow(
     return pressure_functions(modes, level) + jnp.moveaxis(added.reshape(*points.shape[:-1], len(modes)), -1, 0)
 
 
+@jax.jit
 def level_flow(modes: ModeTable, height: Float[Array, ""], points: Float[Array, "*N 3"]) -> Float[Array, "3 G ..."]:
     """Return the velocity (hub frame) of unit states of odd modes on a level plane at points above it."""
     return -velocity_functions(modes, points + height * np.array([0.0, 0.0, 1.0]))
@@ -143,6 +147,7 @@ def self_flow(modes: ModeTable, x: Float[Array, "*N"], y: Float[Array, "*N"]) ->
     return disk_functions(modes, x, y)
 
 
+@jax.jit
 def correlation(rotor: ModeTable, sources: ModeTable, ground: Plane, quadrature: DiskQuadrature) -> Float[Array, "G M"]:
     """Return the velocity correlation matrix G of c = G a for a cylinder (Eqs. 36, 37, 42), cos δ included.
 

@@ -4,6 +4,7 @@
 mean over ψ is the usual dC_T/dr̄: Q L/(πρΩ²R³) for Q blades of sectional lift L(r̄, ψ). C_T = T/(ρA(ΩR)²).
 """
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -13,6 +14,7 @@ from rotorjax.potential.legendre import reduced_legendre_p
 from rotorjax.potential.modes import ModeTable
 
 
+@jax.jit
 def azimuthal(modes: ModeTable, psi: Float[Array, "*N"]) -> Float[Array, "M ..."]:
     """Return cos mψ or sin mψ of each mode at azimuths psi (rad)."""
     shape = (-1,) + (1,) * psi.ndim
@@ -21,6 +23,7 @@ def azimuthal(modes: ModeTable, psi: Float[Array, "*N"]) -> Float[Array, "M ..."
     return jnp.where(cosine, jnp.cos(angle), jnp.sin(angle))
 
 
+@jax.jit
 def shaping(modes: ModeTable, r: Float[Array, "*N"]) -> Float[Array, "M ..."]:
     """Return the radial shaping functions Ψ_n^m(r̄) = P̄_n^m(ν)/ν of Eq. 2 at radii r (over R), He's φ_n^m (He 1989).
 
@@ -39,6 +42,7 @@ def _share(modes: ModeTable) -> Float[Array, " M"]:
     return jnp.where(modes.m == 0, 0.25, 0.5)
 
 
+@jax.jit
 def from_blades(
     lift: Float[Array, "B R"],
     r: Float[Array, " R"],
@@ -55,6 +59,7 @@ def from_blades(
     return _share(modes) / jnp.pi * jnp.einsum("br,mr,mb->m", lift, radial, azimuthal(modes, psi))
 
 
+@jax.jit
 def from_distribution(
     dct_dr: Float[Array, "K R"],
     r: Float[Array, " R"],
@@ -81,6 +86,7 @@ def from_distribution(
     return _share(modes) / psi.size * jnp.einsum("kr,mr,mk->m", dct_dr, radial, azimuthal(modes, psi))
 
 
+@jax.jit
 def from_axisymmetric(
     dct_dr: Float[Array, " R"], r: Float[Array, " R"], weights: Float[Array, " R"], modes: ModeTable
 ) -> Float[Array, " M"]:
@@ -89,6 +95,7 @@ def from_axisymmetric(
     return mean * ((shaping(modes, r) * weights) @ dct_dr)
 
 
+@jax.jit
 def distribution(
     tau: Float[Array, " M"], r: Float[Array, " R"], psi: Float[Array, " K"], modes: ModeTable
 ) -> Float[Array, "K R"]:

@@ -9,6 +9,7 @@ q = √(H_n^m H_j^r)(n+j)(n+j+2)[(n−j)²−1]. They are Galerkin integrals ove
 from functools import cache
 from math import pi, sqrt
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -77,6 +78,7 @@ def _influence_tables(rows: ModeTable, columns: ModeTable) -> tuple[np.ndarray, 
     return table, np.where(r == 0, 0.0, second), np.abs(m - r), m + r
 
 
+@jax.jit
 def influence(rows: ModeTable, columns: ModeTable, x: Float[Array, ""]) -> Float[Array, "J N"]:
     """Return the block of L at X = tan(χ/2), (rows, columns).
 

@@ -65,6 +65,7 @@ def _from_upstream(modes: ModeTable, points: Float[Array, "N 3"], chi: Float[Arr
     return jax.vmap(component)(jnp.eye(3, dtype=points.dtype))
 
 
+@jax.jit
 def skewed_functions(modes: ModeTable, points: Float[Array, "N 3"], chi: Float[Array, ""]) -> Float[Array, "3 M N"]:
     """Return the velocity (hub frame) of unit pressure of each mode at unit speed, at any hub-frame points over R.
 

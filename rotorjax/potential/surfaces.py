@@ -28,6 +28,7 @@ IN_SHADOW = (6, 5)
 LEVEL = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]])
 
 
+@jax.jit
 def shadow(panels: Panels, points: Float[Array, "*N 3"]) -> Float[Array, "*N"]:
     """Return 1 at points with a surface straight between them and the disk, 0 at others, and a smooth step between.
 
