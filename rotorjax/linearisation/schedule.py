@@ -155,7 +155,7 @@ def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
     """Roots over speed, at one height each; over height where there is one speed. By the name of their file."""
     speeds = sorted({place(one) for one in flown})
     heights = sorted({_height(one) for one in flown})
-    if len(speeds) == 1:
+    if len(speeds) == 1 < len(heights):
         over = {_height(one): one.modes for one in flown}
         return {"roots": roots(over, "height over R", f"advance ratio {speeds[0]:g}")}
     found = {}

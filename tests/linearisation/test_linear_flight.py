@@ -175,6 +175,8 @@ def test_several_flights_make_one_scheduled_model(one, other):
         for h in (1.0, 2.0)
     ]
     assert [*schedule.pictures(flights)] == [*schedule.pictures(high[:2])] == ["roots"]  # one speed: over height
+    (alone,) = schedule.pictures(flights[:1]).values()
+    assert alone.axes[0].get_legend().get_texts()[0].get_text() == "advance ratio 0.1"
     assert [*schedule.pictures(high)] == ["roots_height_1", "roots_height_2"]
     np.testing.assert_allclose(data.frequency.sel(mode="coning"), [0.1, 0.2])
     for k, found in enumerate(flights):
