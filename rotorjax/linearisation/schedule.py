@@ -186,7 +186,8 @@ README = """# {title}: linear models of {flights} flights
 
 `scheduled.nc` holds A, B, C, D and the trim values x0, u0, y0 of each flight along `flight`: {states} states of one
 meaning in all of them, with `advance_ratio` and `height` (NaN out of ground effect) beside them, and `growth` and
-`frequency` of every mode by name, per radian of azimuth. **Time is {time}**: poles are per unit of it. Each flight has
+`frequency` of every mode by name, per radian of azimuth (the wake's are numbered, the least damped first, and are
+others in every flight). **Time is {time}**: poles are per unit of it. Each flight has
 a folder of its own, with `.mat` files, the reduced model and a report.
 
     import xarray, control
