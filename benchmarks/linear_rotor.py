@@ -41,6 +41,7 @@ from rotorjax.linearisation.sensitivity import sensitivity
 from rotorjax.ode.harmonic import average
 from rotorjax.ode.hill import harmonic_transfer
 from rotorjax.ode.runge_kutta import RK4
+from rotorjax.rotor.monotone import with_slopes
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.run import Request, request, run
 from rotorjax.trim.solve import trim
@@ -124,10 +125,9 @@ def stepped(base, names):
 
 
 def straight_damper(p):
-    """The rotor with a lag damper without kinks: one line from end to end of its table."""
-    blade = p.blade
-    line = blade.damper_rate * blade.damper_force[-1] / blade.damper_rate[-1]
-    return eqx.tree_at(lambda q: q.blade.damper_force, p, line)
+    """The rotor with a linear lag damper: one line from end to end of its table."""
+    rate, end = p.blade.damper_rate, p.blade.damper_force[-1, 0]
+    return eqx.tree_at(lambda q: q.blade.damper_force, p, with_slopes(rate, rate * end / rate[-1]))
 
 
 def wake_without_kinks(trimmed):

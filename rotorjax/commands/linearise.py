@@ -21,7 +21,8 @@ def register(commands: argparse._SubParsersAction) -> None:
         help="linear state-space models of the rotor about a trim, or of its free wake",
         description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
         "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes "
-        "by name, linearise.json, report.md and report.html; several speeds or heights make a scheduled model. "
+        "by name, linearise.json, report.md and report.html; several speeds or heights make a scheduled model, "
+        "written anew as each is done, beside a folder for each. "
         "With --inflow freewake: flap, lag and all states of the wake, over level ground or none; in flight "
         "periodic, condensed to a hundred states; in hover, seen from the hub, a time-invariant model whose wake "
         "grows, and the reduced model says for which horizon it is, in a folder of its own beside other flights. "
@@ -69,18 +70,20 @@ def _trimmed(chosen: argparse.Namespace) -> int:
         flight.check(request, wanted)
     out = make_folder(chosen.out)
     introduce_flights(requests)
+    lost, known, small = [], [], []
     with _progress_bar() as progress:
-        found = schedule.flights(requests, wanted, progress)
-        lost = [one for one in found if isinstance(one, Result)]
-        known = [one for one in found if not isinstance(one, Result)]
-        progress("identified inflow", 0.0)
-        small = identify.of_flights(known)
-    if len(requests) == 1:
-        for one in known:
-            trim_output.write(one, out, chosen.time)
-    else:
-        schedule.write(known, out, chosen.time)
-    identify.write(small, out)
+        for one in schedule.flights(requests, wanted, progress):
+            if isinstance(one, Result):
+                lost.append(one)
+                continue
+            progress("identified inflow", 0.0)
+            known.append(one)
+            small += identify.of_flights([one])
+            if len(requests) == 1:
+                trim_output.write(one, out, chosen.time)
+            else:
+                schedule.write(known, out, chosen.time)
+            identify.write(small, out)
     for one in lost:
         where = "" if one.request.height is None else f", height {one.request.height:g}"
         print(f"advance ratio {one.request.advance:g}{where}: not converged: {one.trimmed.outcome.why}")

@@ -100,10 +100,15 @@ def lines(found: LinearFlight) -> list[str]:
     db, deg = np.nanmedian(small.gap_db), np.nanmedian(small.gap_deg)
     text = [
         f"{found.periodic.order} states; reduced to {small.model.order}, {small.unstable} unstable modes; largest "
-        f"error of a response up to {HIGHEST:g}/rev, median over all: {db:.2g} dB, {deg:.2g}°",
+        f"error of a response up to {HIGHEST:g}/rev, median over all: {db:.2g} dB, {deg:.3g}°",
         f"linear against nonlinear over a revolution: median {100 * np.median(found.step_error):.2g} %, worst "
         f"{100 * np.max(found.step_error):.2g} %",
     ]
+    if small.unstable and found.wake is not None:
+        text.append(
+            "the wake's mean grows where the blades are held still: the reduced model is for about one revolution, and "
+            "its frequency responses are those of a loop that holds the growth down; for longer take periodic"
+        )
     if found.wake is not None:
         error = found.wake.condensed_error
         text.append(

@@ -194,17 +194,21 @@ def table(found: Sequence[Identified]) -> xr.Dataset:
     data = xr.Dataset({name: (("advance_ratio", "height"), part) for name, part in zip(names, values, strict=True)})
     equation = "M dλ/dψ + K λ = (δC_T, δC_c, δC_s), M = diag(m_0, m_c, m_s), K = [[k_00, k_0c, k_0s], …]"
     return data.assign_coords(advance_ratio=speeds, height=("height", heights, {"units": "R"})).assign_attrs(
-        equation=equation, units="time: azimuth (rad), velocity: ΩR, loads: ρA(ΩR)² and ρA(ΩR)²R"
+        equation=equation,
+        units="time: azimuth (rad), velocity: ΩR, loads: ρA(ΩR)² and ρA(ΩR)²R",
+        between="constants are linear in advance_ratio and in 1/height² (height over R; inf, where that is 0, out of "
+        "ground effect)",
     )
 
 
 def interpolated(data: xr.Dataset, advance: float, height: float = np.inf) -> Inflow:
-    """The inflow between those of a full table, linear in speed and in 1/height: what a simulator does with it.
+    """The inflow between those of a full table, linear in speed and in 1/height², as which the ground's effect fades
+    (Cheeseman & Bennett's 1/16h²): what a simulator does with it.
 
     Raises InputError for a flight outside the table.
     """
-    near = data[list(NAMES)].assign_coords(height=1 / data["height"]).sortby("height")
-    for name, value in (("advance_ratio", advance), ("height", 1 / height)):
+    near = data[list(NAMES)].assign_coords(height=data["height"] ** -2.0).sortby("height")
+    for name, value in (("advance_ratio", advance), ("height", height**-2.0)):
         near = near.sel({name: value}) if value in near[name] else near.interp({name: value})
     flat = np.array([float(near[name]) for name in NAMES])
     if not np.all(np.isfinite(flat)):
@@ -222,4 +226,5 @@ def text(data: xr.Dataset) -> str:
     for mu, h in places:
         here = data.sel(advance_ratio=mu, height=h)
         rows.append(" ".join(f"{value:>18.6g}" for value in (mu, h, *(float(here[name]) for name in names))))
-    return f"# {data.attrs['equation']}\n# {data.attrs['units']}\n" + "\n".join(rows) + "\n"
+    head = "".join(f"# {data.attrs[name]}\n" for name in ("equation", "units", "between"))
+    return head + "\n".join(rows) + "\n"

@@ -1,6 +1,6 @@
 """Linear models over speed or height: one file with every flight's matrices, and modes followed by their names."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +8,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from rotorjax.bench import plotting
+from rotorjax.bench.markdown import table
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder, write_json, write_text
+from rotorjax.io.page import write_page
 from rotorjax.linearisation import trim_output
 from rotorjax.linearisation.condensed import Condensed, aligned
 from rotorjax.linearisation.flight import LinearFlight, linearise_trim
@@ -24,15 +26,23 @@ from rotorjax.ode.models import AZIMUTH, LinearModel
 from rotorjax.trim.run import Progress, Request, Result
 
 
-def flights(requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None) -> list[Found | Result]:
-    """Linearise every flight, each trimmed from the one before. Raises InputError as `linearise_trim` does."""
-    found: list[Found | Result] = []
+def flights(requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None) -> Iterator[Found | Result]:
+    """Linearise one flight after another, each trimmed from the one before.
+
+    Raises InputError as `linearise_trim` does.
+    """
     near: Found | None = None
-    for request in requests:
-        last = linearise_trim(request, wanted, progress, near)
+    for number, request in enumerate(requests, 1):
+        last = linearise_trim(request, wanted, _of_one(progress, number, len(requests)), near)
         near = near if isinstance(last, Result) else last
-        found.append(last)
-    return found
+        yield last
+
+
+def _of_one(progress: Progress | None, number: int, flights: int) -> Progress | None:
+    """Progress that says which flight it is, where there are several."""
+    if progress is None or flights == 1:
+        return progress
+    return lambda stage, residual: progress(f"flight {number} of {flights}, {stage}", residual)
 
 
 def place(found: LinearFlight) -> float:
@@ -80,38 +90,79 @@ def stitched(found: Sequence[LinearFlight], time: Time = "seconds") -> xr.Datase
 
 
 def write(found: Sequence[Found], folder: Path, time: Time = "seconds") -> None:
-    """Write flights as scheduled.nc, README.md, roots (.png and .pdf, one for each height of several speeds), and
-    linearise.json with the numbers of each.
+    """Write flights as scheduled.nc, README.md, roots (.png and .pdf, one for each height of several speeds), report.md
+    and report.html, and linearise.json with the numbers of each; the last flight's own results to a folder of its own.
 
-    Hovers in the free wake, whose states are others, go to folders of their own.
+    Called after every flight, so that all there is is written. Hovers in the free wake, whose states are others, are in
+    their own folders alone.
     """
-    for one in found:
-        if isinstance(one, LinearHover):
-            trim_output.write(one, make_folder(folder / _folder_of(one.result.request.height)), time)
+    trim_output.write(found[-1], make_folder(folder / folder_of(found[-1])), time)
     flown = [one for one in found if isinstance(one, LinearFlight)]
     if not flown:
         return
     data = stitched(flown, time)
     netcdf.write(folder / "scheduled.nc", data)
-    for name, figure in pictures(flown).items():
+    drawn = pictures(flown)
+    for name, figure in drawn.items():
         plotting.save(figure, folder / name)
     sizes = {"flights": len(flown), "states": data.sizes["state"], "time": data.attrs["time"]}
     write_text(folder / "README.md", README.format(title=flown[0].result.request.rotor.name, **sizes))
     write_json(folder / "linearise.json", {"flights": [trim_output.summary(one) for one in flown]})
+    text = report(found, data, tuple(drawn))
+    write_text(folder / "report.md", text)
+    write_page(folder / "report.html", text)
+
+
+def report(found: Sequence[Found], data: xr.Dataset, drawn: Sequence[str]) -> str:
+    """All flights in one report, in Markdown: how damped each is, and every mode over speed and height."""
+    flown = [one for one in found if isinstance(one, LinearFlight)]
+    head = ("flight", "advance ratio", "height over R", "least damped", "growth", "grow in reduced", "step, median %")
+    hovers = ", ".join(_link(one) for one in found if isinstance(one, LinearHover))
+    return (
+        f"# Linear models of {len(flown)} flights: {flown[0].result.request.rotor.name}\n\n"
+        + table(head, map(_row, flown))
+        + (f"\n\nHovers in the free wake, with other states: {hovers}." if hovers else "")
+        + "\n\nGrowth and frequency are per radian of azimuth (1 is once per revolution), seen from the hub. Grow in "
+        "reduced: modes of the reduced model with Re λ ≥ 0. The last column is how far the linear model is from the "
+        "nonlinear equations over a revolution after a step. README.md beside this page says how scheduled.nc is "
+        "loaded.\n\n## Modes by name\n\n"
+        + table(("mode", *map(folder_of, flown)), _modes(data))
+        + "".join(f"\n\n![Roots]({name}.png)" for name in drawn)
+        + "\n"
+    )
+
+
+def _row(found: LinearFlight) -> tuple:
+    """What the report tells of a flight first."""
+    least = max(found.modes, key=lambda mode: mode.exponent.real)
+    where = (_link(found), place(found), _height(found))
+    return (*where, least.name, least.exponent.real, found.small.unstable, 100 * float(np.median(found.step_error)))
+
+
+def _modes(data: xr.Dataset) -> Iterator[tuple[str, ...]]:
+    """Every mode with its exponents, flight by flight."""
+    for mode in data["mode"].values:
+        own = data.sel(mode=mode)
+        pairs = zip(own["growth"].values, own["frequency"].values, strict=True)
+        yield str(mode), *(f"{g:+.3f} {f:+.3f}i" if np.isfinite(g) else "–" for g, f in pairs)
+
+
+def _link(found: Found) -> str:
+    return f"[{folder_of(found)}]({folder_of(found)}/report.html)"
 
 
 def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
     """Roots over speed, at one height each; over height where there is one speed. By the name of their file."""
     speeds = sorted({place(one) for one in flown})
     heights = sorted({_height(one) for one in flown})
-    if len(speeds) == 1:
+    if len(speeds) == 1 < len(heights):
         over = {_height(one): one.modes for one in flown}
         return {"roots": roots(over, "height over R", f"advance ratio {speeds[0]:g}")}
     found = {}
     for height in heights:
         title = "out of ground effect" if np.isinf(height) else f"h = {height:g} R"
         over = {place(one): one.modes for one in flown if _height(one) == height}
-        name = "roots" if len(heights) == 1 else f"roots_{_folder_of(None if np.isinf(height) else height)}"
+        name = "roots" if len(heights) == 1 else f"roots_{_above(None if np.isinf(height) else height)}"
         found[name] = roots(over, "advance ratio", title)
     return found
 
@@ -121,7 +172,13 @@ def _height(found: LinearFlight) -> float:
     return np.inf if found.result.request.height is None else float(found.result.request.height)
 
 
-def _folder_of(height: float | None) -> str:
+def folder_of(found: Found) -> str:
+    """Name of a flight's own folder."""
+    request = found.result.request
+    return f"advance_{request.advance:g}_{_above(request.height)}"
+
+
+def _above(height: float | None) -> str:
     return "free_air" if height is None else f"height_{height:g}"
 
 
@@ -129,7 +186,9 @@ README = """# {title}: linear models of {flights} flights
 
 `scheduled.nc` holds A, B, C, D and the trim values x0, u0, y0 of each flight along `flight`: {states} states of one
 meaning in all of them, with `advance_ratio` and `height` (NaN out of ground effect) beside them, and `growth` and
-`frequency` of every mode by name, per radian of azimuth. **Time is {time}**: poles are per unit of it.
+`frequency` of every mode by name, per radian of azimuth (the wake's are numbered, the least damped first, and are
+others in every flight). **Time is {time}**: poles are per unit of it. Each flight has
+a folder of its own, with `.mat` files, the reduced model and a report.
 
     import xarray, control
     data = xarray.open_dataset("scheduled.nc")

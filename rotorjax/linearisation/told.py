@@ -70,7 +70,8 @@ def mode_content(mode: Mode) -> dict[str, Any]:
 
 def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
     """Exponents in the plane, one colour a flight; the modes of the one in the middle have their names beside them, and
-    a line goes with each mode from flight to flight.
+    a line goes with each of the blades' from flight to flight. Those of the wake are only numbered, the least damped
+    first, and are others in every flight.
     """
     paths: dict[str, list[complex]] = {}
     for modes in by_value.values():
@@ -80,7 +81,7 @@ def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio",
         figure = new_figure(8.5, 5.0)
         axes = figure.subplots()
         axes.axvline(0, color=INK, lw=0.8)
-        for values in paths.values():
+        for values in (own for name, own in paths.items() if not name.startswith("wake")):
             axes.plot(np.real(values), np.imag(values), "-", color=INK, lw=0.6, alpha=0.4)
         for (value, modes), colour in zip(by_value.items(), series_colours(len(by_value)), strict=True):
             exponents = [mode.exponent for mode in modes]

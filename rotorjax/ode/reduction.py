@@ -189,15 +189,19 @@ def balance_in_band(
 
 
 @one_thread
-def balance_rest(model: LinearModel, kept: Sequence[int], order: int, highest: float) -> Reduced:
+def balance_rest(
+    model: LinearModel, kept: Sequence[int], order: int, highest: float, horizon: float = 2 * np.pi
+) -> Reduced:
     """Keep some states as they are, first in the result, and balance the others as a system of their own.
 
     Its inputs are the kept states and the model's own, its outputs what it does to both; each is weighted by how far
     the whole model moves it up to the frequency `highest`, so that what comes back through the kept states counts. What
     nothing moves drops out. order: of the whole. States left out follow at once, which keeps the response at frequency
-    0. Nothing bounds the error of the whole: measure it.
+    0. Nothing bounds the error of the whole: measure it. Where the others alone grow, they are balanced on σ + iω, σ as
+    far right of their fastest mode as a disturbance grows that takes `horizon` for a factor e more: the result is for
+    about that long, and may grow too.
 
-    Raises InputError where `order` does not leave one of the others, or the others alone are not stable.
+    Raises InputError where `order` does not leave one of the others.
     """
     _require_order(model, order, len(kept) + 1, "states are kept as they are, and one of the others")
     first, count = [*kept, *np.setdiff1d(np.arange(model.order), kept)], len(kept)
@@ -206,9 +210,10 @@ def balance_rest(model: LinearModel, kept: Sequence[int], order: int, highest: f
         states=tuple(model.states[i] for i in first), state_units=tuple(model.state_units[i] for i in first),
     )  # fmt: skip
     a = model.a[count:, count:]
-    if np.linalg.eigvals(a).real.max() >= 0:
-        raise InputError("Argument `model` must be stable where the kept states are held, but grows")
-    reach, see, columns, rows = _sizes(model, highest)
+    growth = float(np.linalg.eigvals(a).real.max())
+    sigma = 0.0 if growth < 0 else growth + 1 / horizon
+    a = a - sigma * np.eye(len(a))
+    reach, see, columns, rows = _sizes(model, highest, sigma)
     b = np.concatenate([model.a[count:, :count] * reach[:count], model.b[count:] / columns], axis=1)
     c = np.concatenate([model.a[:count, count:] * see[:count, None], model.c[:, count:] / rows[:, None]])
     right, left, singular = _balance(
@@ -224,11 +229,11 @@ def balance_rest(model: LinearModel, kept: Sequence[int], order: int, highest: f
     return Reduced(replace(small, states=names, state_units=units), None, singular)
 
 
-def _sizes(model: LinearModel, highest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The most that evened inputs move each state (n,), and a push on its rate the evened outputs (n,), up to a
-    frequency; and the scales of inputs (m,) and outputs (q,) that even them.
+def _sizes(model: LinearModel, highest: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The most that evened inputs move each state (n,), and a push on its rate the evened outputs (n,), on σ + iω up
+    to a frequency; and the scales of inputs (m,) and outputs (q,) that even them.
     """
-    points = 1j * np.geomspace(0.01, 1.0, 20) * highest
+    points = sigma + 1j * np.geomspace(0.01, 1.0, 20) * highest
     moved = [model.resolvent.solve(s, model.b) for s in points]
     seen = [model.resolvent.solve(s, model.c.T, adjoint=True) for s in points]
     rows, columns = even(np.max([np.abs(model.c @ x + model.d) for x in moved], axis=0))

@@ -1,10 +1,10 @@
 """Lift and drag of an aerofoil section, for every angle of attack and Mach number, with continuous derivatives.
 
 The table is a bicubic Hermite surface through the data: exact at every node, C1 in angle and Mach number everywhere,
-periodic at ±180°, constant beyond the first and last Mach number. The slopes at the nodes are those of Fritsch &
-Carlson's monotone interpolant (scipy's PCHIP, doi:10.1137/0717021), chosen because a table of a stalled section has
-steps that an ordinary spline would overshoot, to a negative drag, say. They are computed once in float64 numpy, from
-traced coefficients in jax; derivatives with respect to the nodes of a table that is made already hold them fixed.
+periodic at ±180°, constant beyond the first and last Mach number. It is monotone between nodes (monotone.py), because a
+table of a stalled section has steps that an ordinary spline would overshoot, to a negative drag, say. Slopes at the
+nodes are computed once in float64 numpy, from traced coefficients in jax; derivatives with respect to the nodes of a
+table that is made already hold them fixed.
 
 A low-speed table may ask for the Prandtl-Glauert rule: cl/√(1 − M²) where the flow is attached (|α| up to 6°), fading
 out by 14°, where the lift is set by separation, which the rule knows nothing of. The drag is left as it is: without a
@@ -20,6 +20,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.checks import Range, array, check_list, check_range, known
 from rotorjax.errors import InputError
+from rotorjax.rotor.monotone import hermite, inner_slopes
 
 # The rule is used as it stands to M = 0.7; above, its Mach number levels off towards 0.85 so that it stays finite
 # through M = 1.
@@ -62,8 +63,8 @@ def lift_drag(
     """(cl, cd) at angles of attack α (rad, any number of turns) and Mach numbers, elementwise."""
     alpha, mach = jnp.broadcast_arrays(alpha, mach)
     wrapped = alpha - 2 * jnp.pi * jnp.floor((alpha + jnp.pi) / (2 * jnp.pi))
-    i, basis_a = _hermite(wrapped, table.alpha)
-    j, basis_m = _hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
+    i, basis_a = hermite(wrapped, table.alpha)
+    j, basis_m = hermite(jnp.clip(mach, table.mach[0], table.mach[-1]), table.mach)
     # One gather for the four corners: [*n, corner α, corner M, (cl, cd), order α, order M].
     corner = jnp.arange(2)
     patch = table.nodes[(i[..., None] + corner)[..., :, None], (j[..., None] + corner)[..., None, :]]
@@ -125,16 +126,6 @@ def linear_airfoil(slope: float = 2 * np.pi, cd: float = 0.0, zero_lift: float =
     return airfoil_table(alpha_deg, 0.0, cl, cd * xp.ones_like(cl), name="linear")
 
 
-def _hermite(x, nodes):
-    """Interval index and the cubic Hermite basis [*n, corner, order] at x, that of slopes times the width."""
-    i = jnp.clip(jnp.searchsorted(nodes, x, side="right", method="compare_all") - 1, 0, nodes.size - 2)
-    start, width = jnp.moveaxis(jnp.stack([nodes[:-1], jnp.diff(nodes)], axis=-1)[i], -1, 0)
-    t = (x - start) / width
-    value = t * t * (3 - 2 * t)
-    basis = jnp.stack([1 - value, width * t * (1 - t) ** 2, value, width * t * t * (t - 1)], -1)
-    return i, basis.reshape(*basis.shape[:-1], 2, 2)
-
-
 def _attached(alpha):
     """One up to 6°, zero from 14° on, a C2 step between."""
     t = jnp.clip((_SEPARATED - jnp.abs(alpha)) / (_SEPARATED - _ATTACHED), 0.0, 1.0)
@@ -152,28 +143,13 @@ def _slopes_alpha(alpha: np.ndarray, values: Any, xp: Any) -> Any:
     """Slopes in α [N, C] of a coefficient that goes round: the first row's neighbours are the second and the last."""
     turn = 2 * np.pi
     round_ = np.concatenate([[alpha[-2] - turn], alpha, [alpha[1] + turn]])
-    return _inner_slopes(round_, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
+    return inner_slopes(round_, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
 
 
 def _slopes_mach(mach: np.ndarray, values: Any, xp: Any) -> Any:
     """Slopes in M [N, C]: zero at the ends, so that the constant beyond them joins the table without a kink."""
     zero = xp.zeros_like(values[:, :1])
-    return xp.concatenate([zero, _inner_slopes(mach, values.T, xp).T, zero], axis=1)
-
-
-def _inner_slopes(x: np.ndarray, y: Any, xp: Any) -> Any:
-    """Fritsch and Carlson's slopes at all rows but the first and the last, from y [N, C].
-
-    The harmonic mean of the neighbouring intervals' slopes, weighted by their widths (Fritsch & Butland, SIAM J. Sci.
-    Stat. Comput. 5, 1984, Eq. 5); zero where those differ in sign.
-    """
-    width = np.diff(x)[:, None]
-    slope = (y[1:] - y[:-1]) / width
-    before, after = slope[:-1], slope[1:]
-    w_before, w_after = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
-    same = before * after > 0
-    total = w_before / xp.where(same, before, 1.0) + w_after / xp.where(same, after, 1.0)
-    return xp.where(same, (w_before + w_after) / xp.where(same, total, 1.0), 0.0)
+    return xp.concatenate([zero, inner_slopes(mach, values.T, xp).T, zero], axis=1)
 
 
 def _coefficient(label: str, values: Any, shape: tuple[int, int]) -> Any:

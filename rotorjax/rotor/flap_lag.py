@@ -22,6 +22,7 @@ from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import TurningFrame
+from rotorjax.rotor.monotone import read, with_slopes
 
 GRAVITY = 9.80665  # m/s², standard
 
@@ -31,8 +32,8 @@ class Blade(eqx.Module):
 
     offset: e/R. mass: mR²/I. first_moment: SR/I. air: ρR⁵/I, what turns aerodynamic moments into accelerations.
     flap_spring, lag_spring: over IΩ². precone: rad, where the flap spring rests. coupling: tan δ₃, pitch down for flap
-    up. gravity: g/(Ω²R). damper_arm (m), damper_rate (2D − 1,): axial rate over Ω (m), damper_force (2D − 1,): over
-    IΩ² (1/m): the lag damper, odd; None without one.
+    up. gravity: g/(Ω²R). damper_arm (m), damper_rate (2D − 1,): axial rate over Ω (m), damper_force
+    (2D − 1, 2): over IΩ² (1/m), and its slope: the lag damper, odd; None without one.
     """
 
     offset: Float[Array, ""]
@@ -46,7 +47,7 @@ class Blade(eqx.Module):
     gravity: Float[Array, ""]
     damper_arm: Float[Array, ""]
     damper_rate: Float[Array, " N"] | None
-    damper_force: Float[Array, " N"] | None
+    damper_force: Float[Array, "N 2"] | None
 
 
 class Motion(NamedTuple):
@@ -85,6 +86,7 @@ def blade_of(rotor: Rotor, operating: OperatingPoint, gravity: float = GRAVITY) 
     if hinge.damper_rate is not None and hinge.damper_force is not None:
         rate = jnp.concatenate([-hinge.damper_rate[:0:-1], hinge.damper_rate]) / omega
         force = jnp.concatenate([-hinge.damper_force[:0:-1], hinge.damper_force]) / stiffness
+        force = with_slopes(rate, force)
     return Blade(
         offset=hinge.offset / radius,
         mass=hinge.blade_mass * radius**2 / inertia,
@@ -102,11 +104,13 @@ def blade_of(rotor: Rotor, operating: OperatingPoint, gravity: float = GRAVITY) 
 
 
 def damper_moment(blade: Blade, lag_rate: Float[Array, ""]) -> Float[Array, ""]:
-    """Moment of the lag damper against a lag rate (over Ω), over IΩ²; beyond the table as its last piece goes on."""
+    """Moment of the lag damper against a lag rate (over Ω), over IΩ²: monotone cubics through the table, for straight
+    pieces could not be linearised at their kinks; beyond it as its last piece goes on.
+    """
     if blade.damper_rate is None or blade.damper_force is None:
         return jnp.zeros_like(lag_rate)
     axial = blade.damper_arm * jnp.stack([lag_rate, -lag_rate])  # half of a difference is odd to the last bit
-    there, back = jnp.interp(axial, blade.damper_rate, blade.damper_force, "extrapolate", "extrapolate")
+    there, back = read(axial, blade.damper_rate, blade.damper_force)
     return blade.damper_arm * 0.5 * (there - back)
 
 

@@ -11,6 +11,7 @@ from wakes import COARSE, made_up
 
 from rotorjax.cli import main
 from rotorjax.io import netcdf
+from rotorjax.linearisation import flight
 from rotorjax.wake import solution
 from rotorjax.wake.settings import wake_settings
 from tests.browser import opens
@@ -72,6 +73,30 @@ def test_a_trimmed_rotor_at_one_speed_and_over_two(tmp_path, capsys):
     assert stitched.sizes["flight"] == 2
     assert np.isfinite(stitched.growth.sel(mode="coning")).all()
     assert stitched.attrs["time"] == "azimuth (rad)"
+    own = {"advance_0_free_air", f"advance_{stitched.advance_ratio.values[1]:g}_free_air"}
+    files = {"scheduled.nc", "README.md", "report.md", "report.html", "linearise.json", "roots.png", "roots.pdf"}
+    assert {path.name for path in (tmp_path / "two").iterdir()} == files | own
+    assert all((tmp_path / "two" / name / "reduced.mat").exists() for name in own)
+    assert "| coning | -" in (tmp_path / "two" / "report.md").read_text()
+    assert opens(tmp_path / "two" / "report.html", tmp_path)
+
+
+def test_an_interrupted_sweep_leaves_the_flights_that_are_done(tmp_path, monkeypatch):
+    line = ["linearise", "--weight", "72000", "--inflow", "uniform", "--azimuths", "16", "--inputs", "theta_0"]
+    whole = flight.linearise_trim
+
+    def stopped(request, *rest):
+        if request.advance > 0.15:
+            raise KeyboardInterrupt
+        return whole(request, *rest)
+
+    monkeypatch.setattr("rotorjax.linearisation.schedule.linearise_trim", stopped)
+    assert (
+        main([*line, "--outputs", "CT", "--order", "13", "--advance-ratio", "0.1", "0.2", "--out", str(tmp_path)])
+        == 130
+    )
+    assert netcdf.read(tmp_path / "scheduled.nc").sizes["flight"] == 1
+    assert (tmp_path / "advance_0.1_free_air" / "report.md").exists()
 
 
 def test_a_wake_that_is_lost_gives_exit_code_1(tmp_path, monkeypatch, capsys):

@@ -175,8 +175,13 @@ def test_several_flights_make_one_scheduled_model(one, other):
         for h in (1.0, 2.0)
     ]
     assert [*schedule.pictures(flights)] == [*schedule.pictures(high[:2])] == ["roots"]  # one speed: over height
+    (alone,) = schedule.pictures(flights[:1]).values()
+    assert alone.axes[0].get_legend().get_texts()[0].get_text() == "advance ratio 0.1"
     assert [*schedule.pictures(high)] == ["roots_height_1", "roots_height_2"]
     np.testing.assert_allclose(data.frequency.sel(mode="coning"), [0.1, 0.2])
+    wake = Mode("wake collective", -0.2 + 1j, {}, {})  # others in every flight: no line goes from one to the next
+    (drawn,) = schedule.pictures([replace(one, modes=(*one.modes, wake)) for one in flights]).values()
+    assert sum(line.get_marker() == "None" for line in drawn.axes[0].lines) == 2  # coning, and zero growth
     for k, found in enumerate(flights):
         poles, own = (np.sort(np.linalg.eigvals(a).real) for a in (data["A"][k].values, found.full.a))
         np.testing.assert_allclose(poles, own, atol=1e-6)

@@ -4,7 +4,15 @@ import scipy.integrate
 
 from rotorjax.errors import InputError
 from rotorjax.ode.models import LinearModel
-from rotorjax.ode.reduction import balance, balance_in_band, bode_error_db, residualise, step_error
+from rotorjax.ode.reduction import (
+    balance,
+    balance_in_band,
+    balance_rest,
+    bode_error_db,
+    history_gap,
+    residualise,
+    step_error,
+)
 
 
 def model(a, b, c, d=None):
@@ -89,6 +97,27 @@ def test_unstable_modes_are_kept():
     assert error(full, small.model, omega) <= small.bound * (1 + 1e-9)
     with pytest.raises(InputError, match=r"\[2, 32\] \(2 unstable modes are kept\), but is 1"):
         balance(full, 1)
+
+
+def test_states_are_kept_where_the_others_grow():
+    """A step over a revolution by a third of the states, of others that grow by a factor of three and a half in it."""
+    full = heat()
+    a = full.a.copy()
+    a[-2:, -2:] = np.array([[0.2, 1.5], [-1.5, 0.2]])
+    a[0, -1], a[-1, 0] = 3.0, 0.1
+    full, times = model(a, full.b, full.c), np.linspace(0, 2 * np.pi, 49)
+    rest = full.a[2:, 2:]
+    assert np.linalg.eigvals(rest).real.max() > 0.15
+    errors = {}
+    for order in (6, 11, 32):
+        small = balance_rest(full, (0, 1), order, 2.0).model
+        assert small.order <= order
+        assert small.states[:2] == full.states[:2]
+        np.testing.assert_allclose(small.response(np.zeros(1)), full.response(np.zeros(1)), rtol=1e-8)
+        errors[order] = history_gap(full.step(times), small.step(times)).max()
+    assert errors[32] < 1e-6
+    assert errors[11] < 0.01
+    assert errors[11] < errors[6]
 
 
 def test_band_beats_the_whole_in_its_band():

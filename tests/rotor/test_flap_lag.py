@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 from rotorjax.errors import InputError
 from rotorjax.ode.trajectory import integrate
@@ -24,8 +25,13 @@ CALM = jnp.zeros(3)
 
 
 @pytest.fixture(scope="module")
-def blade():
-    return blade_of(*catalogue.load("uh60"))
+def uh60():
+    return catalogue.load("uh60")
+
+
+@pytest.fixture(scope="module")
+def blade(uh60):
+    return blade_of(*uh60)
 
 
 @pytest.fixture(scope="module")
@@ -129,13 +135,51 @@ def test_accelerating_hub_is_felt_as_gravity(blade):
     np.testing.assert_allclose(frame.acceleration, 0.0, atol=1e-17)
 
 
-def test_damper_is_the_table_at_its_arm(blade):
+def damper_force(blade, axial):
+    """Force (N) of the UH-60's damper at axial rates (m/s)."""
     rotor, point = catalogue.load("uh60")
-    arm, omega = 0.176, float(point.omega)
-    rate = 0.00508 / arm / omega  # the table's third row: 1023.09 N at 0.00508 m/s
-    moment = float(damper_moment(blade, jnp.asarray(rate))) * float(rotor.hinge.flap_inertia) * omega**2
-    assert moment == pytest.approx(1023.09 * arm, rel=1e-12)
-    assert float(damper_moment(blade, jnp.asarray(-rate))) == -float(damper_moment(blade, jnp.asarray(rate)))
+    omega = point.omega
+    moment = jax.vmap(lambda rate: damper_moment(blade, rate))(jnp.asarray(axial) / blade.damper_arm / omega)
+    return moment * rotor.hinge.flap_inertia * omega**2 / blade.damper_arm
+
+
+def test_damper_is_its_table(blade, uh60):
+    """At every point of it on both sides, as its last piece goes on beyond it, and odd to the last bit."""
+    hinge = uh60[0].hinge
+    rate, force = np.asarray(hinge.damper_rate), np.asarray(hinge.damper_force)
+    np.testing.assert_allclose(damper_force(blade, rate), force, rtol=1e-12)
+    np.testing.assert_array_equal(damper_force(blade, -rate), -damper_force(blade, rate))
+    assert damper_force(blade, [0.00508])[0] == pytest.approx(1023.09, rel=1e-12)
+    slope = (force[-1] - force[-2]) / (rate[-1] - rate[-2])
+    for beyond in (0.2, 1.0):
+        np.testing.assert_allclose(damper_force(blade, [beyond]), force[-1] + slope * (beyond - rate[-1]), rtol=1e-12)
+
+
+def test_damper_has_no_kinks_and_does_not_overshoot(blade, uh60):
+    """Between its points it is scipy's PCHIP; its slope is one from both sides of every point, and never negative."""
+    hinge = uh60[0].hinge
+    rate, force = np.asarray(hinge.damper_rate), np.asarray(hinge.damper_force)
+    inside = np.linspace(0, rate[-2], 400)  # the last piece begins where the table's end is told
+    odd = [np.concatenate([-values[:0:-1], values]) for values in (rate, force)]
+    np.testing.assert_allclose(damper_force(blade, inside), PchipInterpolator(odd[0], odd[1])(inside), rtol=1e-10, atol=1e-9)
+    slope = jax.vmap(jax.grad(lambda v: damper_force(blade, v[None])[0]))
+    left, right = (np.asarray(slope(jnp.asarray(rate) * (1 + way))) for way in (-1e-9, 1e-9))
+    np.testing.assert_allclose(left, right, rtol=1e-5)
+    assert np.asarray(slope(jnp.linspace(-0.2, 0.2, 801))).min() > 0
+
+
+def test_damper_by_its_table_and_rotor_speed_agrees_with_differences(uh60):
+    rotor, point = uh60
+
+    def moment(force, omega):
+        hinge = eqx.tree_at(lambda h: h.damper_force, rotor.hinge, force)
+        found = blade_of(eqx.tree_at(lambda r: r.hinge, rotor, hinge), eqx.tree_at(lambda p: p.omega, point, omega))
+        return damper_moment(found, jnp.asarray(0.006))
+
+    force, omega, way = rotor.hinge.damper_force, point.omega, jnp.linspace(0, 1, 26) ** 2
+    along = jax.jvp(moment, (force, omega), (way, jnp.ones(())))[1]
+    ends = [moment(force + h * way, omega + h) for h in (1e-4, -1e-4)]
+    np.testing.assert_allclose(along, (ends[0] - ends[1]) / 2e-4, rtol=1e-6)
 
 
 def test_derivatives_agree_with_differences(free):
