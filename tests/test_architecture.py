@@ -5,6 +5,7 @@ from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 PACKAGE = Path(__file__).parent.parent / "rotorjax"
@@ -90,3 +91,27 @@ def test_no_transform_of_xla():
     # it may wait for ever on a CPU: rotorjax/ode/fourier.py
     found = [path.name for path in PACKAGE.rglob("*.py") if "jnp.fft" in path.read_text(encoding="utf-8")]
     assert not found
+
+
+def lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines from `def` to the end; the docstring does not count, decorators neither."""
+    first = function.body[0]
+    docstring = first.end_lineno - first.lineno + 1 if ast.get_docstring(function) is not None else 0
+    return function.end_lineno - function.lineno + 1 - docstring
+
+
+def lengths() -> dict[str, int]:
+    """Every function of the package, nested ones and methods too, and its lines."""
+    return {
+        f"{path.relative_to(PACKAGE)}:{node.lineno} {node.name}": lines(node)
+        for path in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+
+
+def test_functions_are_short():
+    found = lengths()
+    assert {name: n for name, n in found.items() if n > 45} == {}
+    assert np.median(list(found.values())) <= 8
+    assert np.percentile(list(found.values()), 90) <= 25
