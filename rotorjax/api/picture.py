@@ -70,8 +70,10 @@ def together(solved: SeveralSolution, vortices: np.ndarray) -> Figure:
         axes.streamplot(span, height, flow @ across_hubs, flow[..., 2], color="#666666", linewidth=0.5, arrowsize=0.6)
         for path in vortices.reshape(-1, *vortices.shape[2:]):
             axes.plot(path @ across_hubs, path[:, 2], color=FREE_WAKE, linewidth=0.6, alpha=0.7)
-        for at, up in zip(along, hubs[:, 2], strict=True):
-            axes.plot([at - 1, at + 1], [up, up], color="black", linewidth=2.5, solid_capstyle="butt")
+        turn = np.linspace(0, 2 * np.pi, 73)
+        for hub, own in zip(hubs, np.asarray(model.axes), strict=True):
+            rim = hub + np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=-1) @ own.T
+            axes.plot(rim @ across_hubs, rim[:, 2], color="black", linewidth=2.5, solid_capstyle="butt")
         if floor is not None:
             axes.axhline(floor, color="#7a5c3e", linewidth=3)
         axes.set(xlim=span[[0, -1]], ylim=(bottom - 0.03, height[-1]), aspect="equal", ylabel="z/R")

@@ -3,11 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.wake.several import mirrored
 from rotorjax.wake.several_solution import SeveralSolution
 from rotorjax.wake.solution import tip_vortices
 
@@ -44,8 +42,8 @@ class SolvedTogether:
         """Nodes of all tip vortices at the instant at which every blade 0 stands at its phase, common frame, over R."""
         model = self.found.model
         own = np.stack([tip_vortices(one, model.wakes.rotor.blades) for one in self.rotors])
-        placed = [mirrored(jnp.asarray(v), s) + p for v, s, p in zip(own, model.senses, model.places, strict=True)]
-        return np.asarray(placed)
+        placed = [v @ np.asarray(a).T + p for v, a, p in zip(own, model.axes, np.asarray(model.places), strict=True)]
+        return np.stack(placed)
 
     def to_xarray(self) -> "xr.Dataset":
         """Everything as labelled arrays over rotor, azimuth (of each in its own sense) and radius."""
@@ -62,6 +60,11 @@ class SolvedTogether:
             | {
                 "collective_deg": ("rotor", np.asarray(self.collective_deg), {"units": "degree"}),
                 "sense": ("rotor", np.asarray(model.senses), {"units": "1", "long_name": "1: counter-clockwise"}),
+                "shaft": (
+                    ("rotor", "axis"),
+                    np.asarray(model.axes)[..., 2],
+                    {"units": "1", "long_name": "unit vector"},
+                ),
                 "place": (("rotor", "axis"), np.asarray(model.places), {"units": "1", "long_name": "hub over R"}),
                 "inflow": (around, np.stack([np.asarray(one.inflow) for one in self.rotors]), {"units": "1"}),
                 "dct_dr": (around, np.stack([np.asarray(one.dct_dr) for one in self.rotors]), {"units": "1"}),

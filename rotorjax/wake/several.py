@@ -1,12 +1,14 @@
 """Several rotors in one free wake: every rotor has its own states, and all are carried by the flow of all.
 
-Hubs stand at places over R in a common frame (x aft, y to starboard, z up), shafts upright, one radius and one speed.
-A rotor that turns clockwise is kept in a frame mirrored in y, as in potential/rotors.py, so that its blades run along
-rising azimuth too. Level ground answers every wake with its image; surfaces answer all wakes of an instant together.
+Hubs stand at places over R in a common frame (x aft, y to starboard, z up), shafts upright or tilted; one radius, one
+speed, one number of blades. A rotor that turns clockwise is kept in a frame mirrored in y, as in potential/rotors.py,
+so that its blades run along rising azimuth too. Level ground answers every wake with its image; surfaces answer all
+wakes of an instant together.
 
 How the rotors see each other:
-    K = 1           rotors on one shaft, each in the flow of the others averaged over their azimuth: what is left out is
-                    how the inflow pulses as blades pass each other, 2B times a revolution; not among surfaces;
+    K = 1           rotors on one upright shaft, each in the flow of the others averaged over their azimuth: what is
+                    left out is how the inflow pulses as blades pass each other, 2B times a revolution; not among
+                    surfaces;
     K slices        rotors anywhere, periodic over the passage of a blade: the slices of one instant see each other
                     where they stand.
 """
@@ -22,11 +24,13 @@ import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from rotorjax.checks import Range, array, check_range, known, refuse, shown
-from rotorjax.ground import Plane
+from rotorjax.ground import Plane, TurnedPlane
 from rotorjax.operating import OperatingPoint
 from rotorjax.panels.kernel import panel_velocity
 from rotorjax.panels.surface import Panels, Solid, check_clear, floor, leak, solid, watched
+from rotorjax.rotor.alike import alike
 from rotorjax.rotor.geometry import Rotor
+from rotorjax.wake.arrangement import axes_of, check_apart, places_of, senses_of, tilts_of
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.dynamics import inputs_of
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, full_state, transported
@@ -41,9 +45,6 @@ COPIES = 24
 """Least number of blades that stand for the mean over another rotor's azimuth: twice as many change the C_T of UH-60
 rotors 0.2 R apart by 0.1 %."""
 
-NEAREST = 0.02
-"""Least distance of two disks on one shaft, over R."""
-
 THRUST_SLOPE = 0.05
 """About ∂C_T/∂θ₀ of a rotor in its wake: the scale on which a missed thrust counts beside the wake's residual."""
 
@@ -52,6 +53,7 @@ class SeveralWakes(eqx.Module):
     """N rotors in one free wake, and the ground under the common origin.
 
     wakes: every array with a leading axis N. places (N, 3): hubs, over R. senses (N,): 1 counter-clockwise, −1 not.
+    axes (N, 3, 3): each rotor's own axes in the common frame, as columns; mirrored in y where it turns clockwise.
     phases (N,): azimuth of each rotor's blade 0 as slice 0 stands there, in its own sense. coupling: share of each
     other's flow that counts, 1 in every physical case; a search may begin below. thrusts (N,): C_T that the collectives
     are trimmed to, or None. surfaces: in the common frame; what each rotor has of them is its floor. slices (static):
@@ -61,6 +63,7 @@ class SeveralWakes(eqx.Module):
     wakes: FreeWake
     places: Float[Array, "N 3"]
     senses: Float[Array, " N"]
+    axes: Float[Array, "N 3 3"]
     phases: Float[Array, " N"]
     coupling: Float[Array, ""]
     thrusts: Float[Array, " N"] | None
@@ -95,7 +98,7 @@ class Together(NamedTuple):
 
 
 def several_wakes(
-    rotor: Rotor,
+    rotor: Rotor | Sequence[Rotor],
     operating: OperatingPoint,
     places: Sequence[Sequence[float]],
     senses: Sequence[int] | None = None,
@@ -106,63 +109,51 @@ def several_wakes(
     collectives_deg: ArrayLike | None = None,
     thrusts: ArrayLike | None = None,
     phases_deg: ArrayLike | None = None,
+    tilts_deg: Sequence[Sequence[float]] | None = None,
 ) -> SeveralWakes:
-    """Make the model of N like rotors in one free wake, hovering or climbing, in or out of ground effect.
+    """Make the model of N rotors in one free wake, hovering or climbing, in or out of ground effect.
 
+    rotor: the one kind that all are of, or N of them with as many blades, one radius and airfoil tables of one size.
     places (N, 3): hubs over R, x aft, y to starboard, z up. senses: 1 counter-clockwise, −1 clockwise, seen from above;
     by default they alternate. ground: level, its height counted from the common origin. surfaces: as in `free_wake`,
     in the common frame. collectives_deg (N,): the operating point's by default. thrusts (N,): C_T of each rotor that
-    its collective is trimmed to. phases_deg (N,): where blade 0 of each stands as slice 0 does. Rotors on one shaft are
-    solved in each other's mean flow (K = 1) where there are no surfaces.
+    its collective is trimmed to. phases_deg (N,): where blade 0 of each stands as slice 0 does. tilts_deg (N, 2): of
+    each shaft forward and to starboard. Rotors on one upright shaft are solved in each other's mean flow (K = 1) where
+    there are no surfaces.
 
     Raises InputError where shapes differ, a sense is not ±1, disks overlap, the ground is tilted or cuts a disk, the
-    rotors are not of one kind, and as `free_wake` does.
+    rotors are not alike in what they must be, and as `free_wake` does.
 
     >>> import rotorjax as rj
     >>> pair = several_wakes(*rj.rotor("uh60"), [(0, 0, 0), (0, 0, -0.2)])
     >>> pair.slices, pair.senses.tolist()
     (1, [1.0, -1.0])
     """
-    place, sense = _arranged(rotor, places, senses, ground)
+    place = places_of(places)
+    rotors, sense = alike(rotor, len(place)), senses_of(senses, len(place))
+    axes = axes_of(tilts_of(tilts_deg, len(place)), sense)
+    check_apart(place, axes[..., 2])
+    _check_ground(place, axes[..., 2], ground)
     if surfaces is not None:
         check_surfaces(surfaces, operating)
         settings = among_settings() if settings is None else settings
     count, pitch = len(place), operating.collective * 180 / np.pi if collectives_deg is None else collectives_deg
     models = [
-        _over(free_wake(rotor, _pitched(operating, angle), _under(ground, at), settings), surfaces, at)
-        for angle, at in zip(_each("collectives_deg", pitch, count), place, strict=True)
+        _over(free_wake(kind, _pitched(operating, angle), _under(ground, at, own), settings), surfaces, at, own)
+        for kind, angle, at, own in zip(rotors, _each("collectives_deg", pitch, count), place, axes, strict=True)
     ]
-    shared = np.all(np.ptp(place[:, :2], axis=0) == 0) and surfaces is None
+    shared = np.all(np.ptp(place[:, :2], axis=0) == 0) and np.all(axes[:, 2, 2] == 1) and surfaces is None
     return SeveralWakes(
         wakes=jax.tree.map(lambda *a: jnp.stack(a), *models),
         places=jnp.asarray(place),
         senses=jnp.asarray(sense),
+        axes=jnp.asarray(axes),
         phases=_each("phases_deg", 0.0 if phases_deg is None else phases_deg, count) * (jnp.pi / 180),
         coupling=array(1.0),
         thrusts=None if thrusts is None else _thrusts(thrusts, count),
         surfaces=None if surfaces is None else solid(surfaces, ground),
         slices=1 if shared else models[0].settings.azimuths,
     )
-
-
-def _arranged(
-    rotor: Rotor, places: Sequence[Sequence[float]], senses: Sequence[int] | None, ground: Plane | None
-) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
-    """Places and senses of the rotors, checked."""
-    if not isinstance(rotor, Rotor):
-        raise refuse(
-            "rotor", "be one rotor, the kind that all are of (collectives, thrusts and senses may differ)", shown(rotor)
-        )
-    place = np.array(places, float)
-    if place.ndim != 2 or place.shape[1] != 3 or len(place) < 1 or not np.all(np.isfinite(place)):
-        raise refuse("places", "be finite and of shape (N, 3)", f"of shape {place.shape}")
-    count = len(place)
-    sense = np.array([1 - 2 * (i % 2) for i in range(count)] if senses is None else senses, float)
-    if sense.shape != (count,) or not np.all(np.abs(sense) == 1):
-        raise refuse("senses", f"hold {count} numbers, 1 (counter-clockwise) or -1", shown(senses))
-    _check_apart(place)
-    _check_ground(place, ground)
-    return place, sense
 
 
 def _each(name: str, values: ArrayLike, count: int) -> Float[Array, " N"]:
@@ -185,48 +176,30 @@ def _pitched(operating: OperatingPoint, degrees: Array) -> OperatingPoint:
     return eqx.tree_at(lambda o: o.collective, operating, degrees * (jnp.pi / 180))
 
 
-def _under(ground: Plane | None, place: np.ndarray) -> Plane | None:
-    """The plane seen from a hub."""
-    return None if ground is None else Plane(ground.height + place[2], ground.slope)
+def _under(ground: Plane | None, place: np.ndarray, axes: np.ndarray) -> Plane | None:
+    """The plane seen from a hub in its own axes."""
+    return None if ground is None else TurnedPlane(ground.height + place[2], ground.slope, jnp.asarray(axes.T))
 
 
-def _over(model: FreeWake, surfaces: Panels | None, place: np.ndarray) -> FreeWake:
+def _over(model: FreeWake, surfaces: Panels | None, place: np.ndarray, axes: np.ndarray) -> FreeWake:
     """A rotor's own model over its floor among surfaces. Raises InputError where they cut its disk."""
     if surfaces is None:
         return model
-    seen = surfaces.moved(-place)
+    order = slice(None) if np.linalg.det(axes) > 0 else slice(None, None, -1)  # mirrored corners run the other way
+    seen = Panels((surfaces.corners - place)[:, order] @ axes)
     check_clear(seen)
     return replace(model, over=floor(seen, model.ground))
 
 
-def _check_apart(place: np.ndarray) -> None:
-    """Refuse disks that have a point in common."""
-    for i in range(len(place)):
-        for j in range(i):
-            gap = place[i] - place[j]
-            if np.hypot(*gap[:2]) < 2 and abs(gap[2]) < NEAREST:
-                raise refuse(
-                    "places",
-                    "keep the disks apart",
-                    f"such that rotors {j} and {i} at {place[j].tolist()} and {place[i].tolist()} overlap: move one by "
-                    f"2 R, or by {NEAREST:g} R along its shaft",
-                )
-
-
-def _check_ground(place: np.ndarray, ground: Plane | None) -> None:
+def _check_ground(place: np.ndarray, shafts: np.ndarray, ground: Plane | None) -> None:
     if ground is None or not known(ground):
         return
     if float(ground.slope) != 0:
         raise refuse("ground", "be level under several rotors", f"tilted by {np.rad2deg(float(ground.slope)):g} deg")
-    height = float(ground.height) + place[:, 2]
-    if not np.all(height > 0):
-        i = int(np.argmin(height))
-        raise refuse("places", "keep every disk above the ground", f"{-height[i]:.3g} R under it for rotor {i}")
-
-
-def mirrored(vectors: Float[Array, "*n 3"], sense: Float[Array, ""]) -> Float[Array, "*n 3"]:
-    """Vectors taken from a rotor's own frame to the common one's directions, and back."""
-    return vectors * jnp.stack([jnp.ones_like(sense), sense, jnp.ones_like(sense)])
+    lowest = float(ground.height) + place[:, 2] - np.hypot(shafts[:, 0], shafts[:, 1])
+    if not np.all(lowest > 0):
+        i = int(np.argmin(lowest))
+        raise refuse("places", "keep every disk above the ground", f"{-lowest[i]:.3g} R under it for rotor {i}")
 
 
 def evaluate(several: SeveralWakes, x: Unknowns) -> Evaluation:
@@ -268,15 +241,15 @@ def _from_another(
     several: SeveralWakes, i: Array, j: Array, targets: Float[Array, "K T 3"], source: FreeWake, segments: Segments
 ) -> Float[Array, "K T 3"]:
     """Velocity at points of rotor i's slices from the wake of rotor j."""
-    apart, turned = several.places[i] - several.places[j], several.senses[i] * several.senses[j]
+    apart, turned = several.places[i] - several.places[j], several.axes[j].T @ several.axes[i]
     angles = several.angles
     at = to_hub(targets, angles[i], source.rotor.blades)
-    points = mirrored(at, turned) + mirrored(apart, several.senses[j])
+    points = at @ turned.T + apart @ several.axes[j]
     if several.slices == 1:
         flow = _mean_flow(source, jax.tree.map(lambda a: a[0], segments), points[0])[None]
     else:
         flow = at_instants(source, segments, points, angles[j])
-    return from_hub(mirrored(flow, turned), angles[i], several.slices)
+    return from_hub(flow @ turned, angles[i], several.slices)
 
 
 def _mean_flow(model: FreeWake, segments: Segments, points: Float[Array, "T 3"]) -> Float[Array, "T 3"]:
@@ -295,13 +268,13 @@ def answer(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
     blades = several.wakes.rotor.blades
 
     def at(one: tuple[Array, Array, Array, Array]) -> Array:
-        targets, place, sense, angles = one
-        points = mirrored(to_hub(targets, angles, blades), sense) + place
+        targets, place, axes, angles = one
+        points = to_hub(targets, angles, blades) @ axes.T + place
         flow = jax.lax.map(lambda both: share * panel_velocity(both[0], corners, both[1], ground), (points, density))
-        return from_hub(mirrored(flow, sense), angles, several.slices)
+        return from_hub(flow @ axes, angles, several.slices)
 
     targets = eqx.filter_vmap(targets_of)(several.wakes, state)
-    return jax.lax.map(at, (targets, several.places, several.senses, several.angles))
+    return jax.lax.map(at, (targets, several.places, several.axes, several.angles))
 
 
 def densities(several: SeveralWakes, segments: Segments) -> Float[Array, "I P"]:
@@ -330,11 +303,11 @@ def _blown(
     instants = several.slices // several.wakes.rotor.blades
 
     def through(one: tuple[FreeWake, Segments, Array, Array, Array]) -> Array:
-        model, sources, place, sense, angles = one
-        at = jnp.broadcast_to(mirrored(points - place, sense), (instants, len(points), 3))
-        return jnp.sum(mirrored(at_instants(model, sources, at, angles), sense) * normals, axis=-1)
+        model, sources, place, axes, angles = one
+        at = jnp.broadcast_to((points - place) @ axes, (instants, len(points), 3))
+        return jnp.sum(at_instants(model, sources, at, angles) * (normals @ axes), axis=-1)
 
-    each = (several.wakes, segments, several.places, several.senses, several.angles)
+    each = (several.wakes, segments, several.places, several.axes, several.angles)
     return jnp.sum(jax.lax.map(through, each), axis=0)
 
 
@@ -370,15 +343,15 @@ def velocity(several: SeveralWakes, state: WakeState, points: Float[Array, "P 3"
     """Induced velocity over ΩR at points of the common frame (over R), mean over the instants of a blade's passage."""
     segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
 
-    def one(model: FreeWake, sources: Segments, place: Array, sense: Array, angles: Array) -> Array:
-        own = mirrored(points - place, sense)
+    def one(model: FreeWake, sources: Segments, place: Array, axes: Array, angles: Array) -> Array:
+        own = (points - place) @ axes
         if several.slices == 1:
-            return mirrored(_mean_flow(model, jax.tree.map(lambda a: a[0], sources), own), sense)
+            return _mean_flow(model, jax.tree.map(lambda a: a[0], sources), own) @ axes.T
         instants = several.slices // model.rotor.blades
         at = jnp.broadcast_to(own, (instants, *own.shape))
-        return mirrored(jnp.mean(at_instants(model, sources, at, angles), axis=0), sense)
+        return jnp.mean(at_instants(model, sources, at, angles), axis=0) @ axes.T
 
-    each = (several.wakes, segments, several.places, several.senses, several.angles)
+    each = (several.wakes, segments, several.places, several.axes, several.angles)
     flow = jnp.sum(jax.lax.map(lambda args: one(*args), each), axis=0)
     if several.surfaces is None:
         return flow

@@ -11,7 +11,7 @@ import rotorjax as rj
 from rotorjax.errors import InputError
 from rotorjax.wake import field
 from rotorjax.wake.equilibrium import full_state, spread
-from rotorjax.wake.several import answer, interference, leaked, several_wakes, velocity
+from rotorjax.wake.several import answer, evaluate, interference, leaked, several_wakes, velocity
 
 SETTINGS = rj.WakeSettings(**COARSE)
 THRUST = 0.006
@@ -145,6 +145,7 @@ BAD = {
     "`ground` must be level": {"ground": rj.plane(2.0, 10.0)},
     "`places` must keep every disk above the ground": {"ground": rj.plane(0.1)},
     "`collectives_deg` must be a number or 2 of them": {"collectives_deg": [1.0, 2.0, 3.0]},
+    "`tilts_deg` must be of shape": {"tilts_deg": [(3.0, 0.0)]},
     "`thrusts` must be a number": {"thrusts": -0.01},
     "keep clear of the disk": {"surfaces": rj.wall(0.5, bottom=-1.0, top=1.0)},
     "`surfaces` must be made by": {"surfaces": "wall"},
@@ -157,9 +158,70 @@ def test_wrong_input_is_named(message, uh60):
         several_wakes(*uh60, **{"places": [(0, 0, 0), (0, 0, -0.2)], "settings": SETTINGS} | BAD[message])
 
 
-def test_rotors_of_two_kinds_are_refused(uh60):
-    with pytest.raises(InputError, match="be one rotor, the kind that all are of"):
-        several_wakes([uh60[0], uh60[0]], uh60[1], [(0, 0, 0), (3, 0, 0)])  # type: ignore[arg-type]
+def test_rotors_that_cannot_stand_side_by_side_are_refused(uh60):
+    places = [(0, 0, 0), (3, 0, 0)]
+    with pytest.raises(InputError, match="one rotor, the kind that all are of, or 2 of them"):
+        several_wakes([uh60[0]] * 3, uh60[1], places)
+    with pytest.raises(InputError, match="have one number of blades for all, but is 4 and 2"):
+        several_wakes([uh60[0], rj.rotor("tn2318_2")[0]], uh60[1], places)
+    with pytest.raises(InputError, match="overlap"):
+        several_wakes(*uh60, [(0, 0, 0), (1.9, 0, 0)], tilts_deg=[(-10, 0), (10, 0)])
+    several_wakes(*uh60, [(0, 0, 0), (1.9, 0, 0.1)], tilts_deg=[(-10, 0), (10, 0)])  # one rim above the other
+    with pytest.raises(InputError, match="every disk above the ground"):
+        several_wakes(*uh60, places, tilts_deg=[(0, 0), (30, 0)], ground=rj.plane(0.49))
+
+
+def test_a_rotor_that_leans_stands_over_a_slope(uh60, alone):
+    """A shaft that leans aft by δ sees level ground as the paper's slope, rising aft by δ: the same flow in the rotor's
+    own frame, h along the shaft; and seen from the common frame none of it goes through the ground.
+    """
+    lean, height = 12.0, 1.1
+    leaning = several_wakes(*uh60, [(0, 0, 0)], ground=rj.plane(height), settings=SETTINGS, tilts_deg=[(-lean, 0.0)])
+    states, own = of_each(alone, leaning), np.asarray(leaning.axes[0])
+    model = rj.free_wake(*uh60, rj.plane(height / np.cos(np.deg2rad(lean)), lean), SETTINGS)
+    points = np.random.default_rng(1).uniform(-0.8, 0.8, (6, 3)) - [0, 0, 0.3]
+    wanted = field.velocity(jax.tree.map(lambda a: a[0], states), jnp.asarray(points), model).mean(axis=0)
+    flow = eqx.filter_jit(velocity)
+    np.testing.assert_allclose(flow(leaning, states, jnp.asarray(points @ own.T)) @ own, wanted, atol=1e-12)
+    ground = jnp.asarray(np.column_stack([points[:, :2], np.full(6, -height)]))
+    np.testing.assert_allclose(flow(leaning, states, ground)[:, 2], 0, atol=1e-14)
+
+
+def test_a_pair_that_leans_apart_is_its_own_mirror_image(uh60, alone):
+    """Side by side, each leaning outboard; and the whole of it turned by 90°, so that they lean fore and aft."""
+    leans = {"settings": SETTINGS, "senses": [1, -1]}
+    abreast = several_wakes(*uh60, [(0, -1.2, 0), (0, 1.2, 0)], tilts_deg=[(0, -8), (0, 8)], **leans)
+    left, right = np.asarray(eqx.filter_jit(interference)(abreast, of_each(alone, abreast)))
+    assert np.abs(left).max() > 1e-3
+    np.testing.assert_allclose(left, right, atol=1e-13)
+    places, phases = [(1.2, 0, 0), (-1.2, 0, 0)], [90.0, -90.0]  # each blade 0 where the turn took it, in its own sense
+    tandem = several_wakes(*uh60, places, tilts_deg=[(-8, 0), (8, 0)], phases_deg=phases, **leans)
+    turned = np.asarray(eqx.filter_jit(interference)(tandem, of_each(alone, tandem)))
+    np.testing.assert_allclose(turned, [left, right], atol=1e-12)
+
+
+def test_kinds_may_differ_in_chord_and_twist(uh60, alone):
+    """Left and right are mirror images, whichever has more chord; more stations of a table change nothing."""
+    kind, operating = uh60
+    wide = eqx.tree_at(lambda rotor: rotor.chord.values, kind, kind.chord.values * 4 / 3)
+    between = (kind.twist.stations[1:] + kind.twist.stations[:-1]) / 2
+    stations = jnp.sort(jnp.concatenate([kind.twist.stations, between]))
+    finer = eqx.tree_at(
+        lambda rotor: (rotor.twist.stations, rotor.twist.values), kind, (stations, kind.twist(stations))
+    )
+
+    @eqx.filter_jit
+    def circulation(model):
+        x = jax.tree.map(lambda a: jnp.repeat(a[None], 2, axis=0), spread(alone.unknowns, model.slices))
+        return evaluate(model, x).loads.circulation
+
+    def of(*kinds):
+        return np.asarray(circulation(several_wakes(kinds, operating, [(0, -1.2, 0), (0, 1.2, 0)], settings=SETTINGS)))
+
+    found, twins = of(kind, wide), of(kind, finer)
+    np.testing.assert_allclose(found, of(wide, kind)[::-1], rtol=1e-10)
+    np.testing.assert_allclose(twins, of(kind, kind), rtol=1e-10)
+    assert 1.1 < found[1].sum() / found[0].sum() < 4 / 3
 
 
 def test_a_traced_pair_is_sent_to_its_derivative(uh60):

@@ -1,0 +1,61 @@
+"""Rotors of several kinds in arrays of one shape."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from rotorjax.checks import refuse, shown
+from rotorjax.rotor.geometry import Rotor, Table
+
+
+def alike(rotor: Rotor | Sequence[Rotor], count: int) -> tuple[Rotor, ...]:
+    """One rotor for each of `count`, whose arrays can be stacked: blade tables are read at the stations of all.
+
+    Raises InputError for what are no rotors or not so many, and where they differ in their number of blades, in radius,
+    in having hinges, or in the size of their airfoil tables.
+
+    >>> import rotorjax as rj
+    >>> two, other = rj.rotor("knight_hefner_2")[0], rj.rotor("tn2318_2")[0]
+    >>> [len(kind.chord.stations) for kind in alike([two, two], 2)]
+    [2, 2]
+    """
+    kinds = (rotor,) * count if isinstance(rotor, Rotor) else tuple(rotor) if isinstance(rotor, Sequence) else ()
+    if len(kinds) != count or not all(isinstance(kind, Rotor) for kind in kinds):
+        raise refuse("rotor", f"be one rotor, the kind that all are of, or {count} of them", shown(rotor))
+    first = kinds[0]
+    if all(kind is first for kind in kinds):
+        return kinds
+    for what, of in _MUST_AGREE.items():
+        found = [of(kind) for kind in kinds]
+        if any(value != found[0] for value in found):
+            raise refuse("rotor", f"have one {what} for all", " and ".join(dict.fromkeys(map(str, found))))
+    name = " and ".join(dict.fromkeys(kind.name for kind in kinds))
+    tables = {
+        table: np.unique(np.concatenate([np.asarray(getattr(kind, table).stations) for kind in kinds]))
+        for table in ("chord", "twist", "sweep")
+    }
+    return tuple(
+        replace(
+            kind,
+            name=name,
+            hinge=None,
+            rotation=first.rotation,
+            **{table: _at(getattr(kind, table), stations) for table, stations in tables.items()},
+        )
+        for kind in kinds
+    )
+
+
+def _at(table: Table, stations: np.ndarray) -> Table:
+    """The same straight lines with more stations."""
+    return Table(jnp.asarray(stations), table(jnp.asarray(stations)))
+
+
+_MUST_AGREE = {
+    "number of blades": lambda rotor: rotor.blades,
+    "radius": lambda rotor: float(rotor.radius),
+    "size of airfoil table": lambda rotor: [jnp.shape(leaf) for leaf in jax.tree.leaves(rotor.airfoil)],
+}
