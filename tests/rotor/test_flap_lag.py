@@ -161,7 +161,9 @@ def test_damper_has_no_kinks_and_does_not_overshoot(blade, uh60):
     rate, force = np.asarray(hinge.damper_rate), np.asarray(hinge.damper_force)
     inside = np.linspace(0, rate[-2], 400)  # the last piece begins where the table's end is told
     odd = [np.concatenate([-values[:0:-1], values]) for values in (rate, force)]
-    np.testing.assert_allclose(damper_force(blade, inside), PchipInterpolator(odd[0], odd[1])(inside), rtol=1e-10, atol=1e-9)
+    np.testing.assert_allclose(
+        damper_force(blade, inside), PchipInterpolator(odd[0], odd[1])(inside), rtol=1e-10, atol=1e-9
+    )
     slope = jax.vmap(jax.grad(lambda v: damper_force(blade, v[None])[0]))
     left, right = (np.asarray(slope(jnp.asarray(rate) * (1 + way))) for way in (-1e-9, 1e-9))
     np.testing.assert_allclose(left, right, rtol=1e-5)
