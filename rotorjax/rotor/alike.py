@@ -22,8 +22,9 @@ def alike(rotor: Rotor | Sequence[Rotor], count: int) -> tuple[Rotor, ...]:
     >>> [len(kind.chord.stations) for kind in alike([two, two], 2)]
     [2, 2]
     """
-    kinds = (rotor,) * count if isinstance(rotor, Rotor) else tuple(rotor) if isinstance(rotor, Sequence) else ()
-    if len(kinds) != count or not all(isinstance(kind, Rotor) for kind in kinds):
+    given = [rotor] * count if isinstance(rotor, Rotor) else rotor
+    kinds = tuple(given) if isinstance(given, Sequence) else ()
+    if not kinds or len(kinds) != count or not all(isinstance(kind, Rotor) for kind in kinds):
         raise refuse("rotor", f"be one rotor, the kind that all are of, or {count} of them", shown(rotor))
     first = kinds[0]
     if all(kind is first for kind in kinds):
