@@ -69,27 +69,36 @@ def mode_content(mode: Mode) -> dict[str, Any]:
 
 
 def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
-    """Exponents in the plane, one colour a flight; the modes of the one in the middle have their names beside them, and
-    a line goes with each of the blades' from flight to flight. Those of the wake are only numbered, the least damped
-    first, and are others in every flight.
+    """Exponents in the plane, one colour a flight, those of the wake hollow; the modes of the one in the middle have
+    their names beside them. A line goes with each of the blades' from flight to flight; the wake's, which are only
+    numbered, the least damped first, are others in every flight, and have their names where there is one alone.
     """
     paths: dict[str, list[complex]] = {}
     for modes in by_value.values():
-        for mode in modes:
+        for mode in filter(_of_blades, modes):
             paths.setdefault(mode.name, []).append(mode.exponent)
+    middle = list(by_value.values())[len(by_value) // 2]
     with style():
         figure = new_figure(8.5, 5.0)
         axes = figure.subplots()
         axes.axvline(0, color=INK, lw=0.8)
-        for values in (own for name, own in paths.items() if not name.startswith("wake")):
+        for values in paths.values():
             axes.plot(np.real(values), np.imag(values), "-", color=INK, lw=0.6, alpha=0.4)
         for (value, modes), colour in zip(by_value.items(), series_colours(len(by_value)), strict=True):
-            exponents = [mode.exponent for mode in modes]
-            axes.plot(np.real(exponents), np.imag(exponents), "o", color=colour, ms=4.5, label=f"{label} {value:g}")
-        _name(axes, list(by_value.values())[len(by_value) // 2])
+            for mode in modes:
+                fill = colour if _of_blades(mode) else "none"
+                axes.plot(mode.exponent.real, mode.exponent.imag, "o", color=colour, mfc=fill, ms=4.5)
+            axes.plot([], [], "o", color=colour, ms=4.5, label=f"{label} {value:g}")
+        if not all(map(_of_blades, middle)):
+            axes.plot([], [], "o", color=INK, mfc="none", ms=4.5, label="of the wake")
+        _name(axes, middle if len(by_value) == 1 else list(filter(_of_blades, middle)))
         axes.set(xlabel="growth per radian", ylabel="frequency, 1/rev", title=where)
         axes.legend(loc="upper left")
     return figure
+
+
+def _of_blades(mode: Mode) -> bool:
+    return not mode.name.startswith("wake")
 
 
 def _name(axes: Axes, modes: Sequence[Mode]) -> None:
