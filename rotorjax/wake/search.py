@@ -16,6 +16,7 @@ from rotorjax.ode.continuation import Branch, Steps, continuation
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.panels.surface import refitted
+from rotorjax.rotor.geometry import twist
 from rotorjax.wake.equilibrium import METHOD, Unknowns, look, told
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
@@ -69,7 +70,7 @@ class Search:
 
     def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
-        is none, and where that is lost by way of a distant ground or the auxiliary flow.
+        is none, and where that is lost by way of less pitch, a distant ground or the auxiliary flow.
         """
         found = self.from_guess(model, prescribed(model) if guess is None else guess, self.tol)
         self.note("prescribed wake", found)
@@ -78,8 +79,23 @@ class Search:
             return model, found.x
         if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)
+        here, x = self.by_way_of_less_pitch(model)
+        if self.ok:
+            return here, x
         here, x = self.from_nothing(on_host(eqx.tree_at(lambda m: m.ground.height, model, np.asarray(DISTANT))))
         return self.move(here, model, x, "nearer to the ground") if self.ok else (here, x)
+
+    def by_way_of_less_pitch(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
+        """Axisymmetric wake of a model over ground by way of half the pitch at 0.75 R: a light wake lies near the
+        prescribed one however near the ground is, and grows into the heavy one.
+        """
+        collective = np.asarray(model.operating.collective)
+        pitch = collective + np.asarray(twist(model.rotor, np.asarray(0.75)))
+        light = on_host(eqx.tree_at(lambda m: m.operating.collective, model, collective - 0.5 * pitch))
+        found = self.from_guess(light, prescribed(light), self.tol)
+        self.note("half the pitch", found)
+        self.ok, self.why = found.converged, found.why
+        return self.move(light, model, found.x, "more pitch") if self.ok else (light, found.x)
 
     def by_way_of_washout(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model by way of the auxiliary flow, which is taken back."""
