@@ -115,3 +115,13 @@ def test_functions_are_short():
     assert {name: n for name, n in found.items() if n > 45} == {}
     assert np.median(list(found.values())) <= 8
     assert np.percentile(list(found.values()), 90) <= 25
+
+
+def test_few_arguments_are_told_apart_by_their_place():
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                names = [a.arg for a in node.args.posonlyargs + node.args.args if a.arg not in ("self", "cls")]
+                found[f"{path.relative_to(PACKAGE)}:{node.lineno} {node.name}"] = len(names)
+    assert {name: n for name, n in found.items() if n > 8} == {}

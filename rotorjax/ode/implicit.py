@@ -1,7 +1,7 @@
 """Derivatives of a converged solution by the implicit function theorem: one linear solve, nothing unrolled."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -17,6 +17,15 @@ from rotorjax.ode.outcome import Outcome, traceable
 Method = Literal["dense", "gmres"]
 
 
+class _Way(NamedTuple):
+    """How the linear equation is solved; see `attach`."""
+
+    method: Method
+    chunk: int
+    restart: int
+    refinements: int = 1
+
+
 def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> Float[Array, "n n"]:
     """Matrix of a linear map, `chunk` columns at a time."""
 
@@ -26,21 +35,13 @@ def _materialise(product: Callable, example: Float[Array, " n"], chunk: int) -> 
     return jax.lax.map(column, jnp.arange(example.size), batch_size=min(chunk, example.size)).T
 
 
-def _solve(
-    product: Callable,
-    b: Float[Array, " n"],
-    method: Method,
-    chunk: int,
-    restart: int,
-    inverse: Array | None,
-    refinements: int,
-) -> Float[Array, " n"]:
+def _solve(product: Callable, b: Float[Array, " n"], way: _Way, inverse: Array | None) -> Float[Array, " n"]:
     """Solve product(v) = b so that jax can differentiate and transpose it."""
     if inverse is not None:
 
         def refined(matrix: Callable, v: Array, inverse: Array) -> Array:
             found = inverse @ v
-            for _ in range(refinements):
+            for _ in range(way.refinements):
                 found = found + inverse @ (v - matrix(found))
             return found
 
@@ -50,16 +51,16 @@ def _solve(
             solve=lambda matrix, v: refined(matrix, v, inverse),
             transpose_solve=lambda matrix, v: refined(matrix, v, inverse.T),
         )
-    if method == "gmres":
+    if way.method == "gmres":
         # Wrapped once more: jax's gmres alone starts from zeros_like(b), which transposition takes for an unknown.
         def solve(matrix: Callable, v: Array) -> Array:
             gmres = jax.scipy.sparse.linalg.gmres
-            found = gmres(matrix, v, tol=1e-11, restart=min(restart, b.size), maxiter=20, solve_method="batched")[0]
+            found = gmres(matrix, v, tol=1e-11, restart=min(way.restart, b.size), maxiter=20, solve_method="batched")[0]
             reached = jnp.linalg.norm(matrix(found) - v) <= 1e-7 * jnp.linalg.norm(v)
             return jnp.where(reached, found, jnp.nan)
 
         return jax.lax.custom_linear_solve(product, b, solve=solve, transpose_solve=solve)
-    factors = jax.scipy.linalg.lu_factor(_materialise(product, b, chunk))
+    factors = jax.scipy.linalg.lu_factor(_materialise(product, b, way.chunk))
     return jax.lax.custom_linear_solve(
         product,
         b,
@@ -74,11 +75,8 @@ def _tangent(
     solution: PyTree,
     args: tuple,
     args_dot: tuple,
-    method: Method,
-    chunk: int,
-    restart: int,
+    way: _Way,
     inverse: Array | None = None,
-    refinements: int = 1,
     left: Callable | None = None,
 ) -> PyTree:
     """Solve F_x dx = −F_p dp at the solution; both sides first go through left(v, solution, *args), if there is one."""
@@ -97,7 +95,7 @@ def _tangent(
 
     _, push = eqx.filter_jvp(of_args, (args,), (args_dot,))
     _, product = jax.linearize(of_state, flat)
-    return unravel(_solve(product, -push, method, chunk, restart, inverse, refinements))
+    return unravel(_solve(product, -push, way, inverse))
 
 
 def attach(
@@ -128,6 +126,7 @@ def attach(
     Raises InputError where `method` is unknown.
     """
     _check(method)
+    way = _Way(method, chunk, restart, refinements)
 
     @eqx.filter_custom_jvp
     def value(solution: PyTree, args: tuple) -> PyTree:
@@ -140,7 +139,7 @@ def attach(
         here = jax.lax.stop_gradient((x, *primals[1]))
         exact = inverse(*here) if callable(inverse) else inverse
         left = None if precondition is None else precondition(*here)
-        return x, _tangent(residual, x, primals[1], tangents[1], method, chunk, restart, exact, refinements, left)
+        return x, _tangent(residual, x, primals[1], tangents[1], way, exact, left)
 
     return value(jax.lax.stop_gradient(solution), traceable(args))
 
@@ -177,7 +176,7 @@ def implicit_orbit(
     @orbit.def_jvp
     def rule(primals: tuple, tangents: tuple) -> tuple:
         x = orbit(*primals)
-        return x, _tangent(residual, x, primals[0], tangents[0], method, chunk, restart)
+        return x, _tangent(residual, x, primals[0], tangents[0], _Way(method, chunk, restart))
 
     return lambda *args: orbit(traceable(args))
 

@@ -90,7 +90,7 @@ class Search:
         prescribed one however near the ground is, and grows into the heavy one.
         """
         collective = np.asarray(model.operating.collective)
-        pitch = collective + np.asarray(twist(model.rotor, np.asarray(0.75)))
+        pitch = collective + np.asarray(twist(model.rotor, jnp.asarray(0.75)))
         light = on_host(eqx.tree_at(lambda m: m.operating.collective, model, collective - 0.5 * pitch))
         found = self.from_guess(light, prescribed(light), self.tol)
         self.note("half the pitch", found)
