@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rotorjax.ground import plane
+from rotorjax.wake import search
 from rotorjax.wake.dynamics import inputs_of, rhs
 from rotorjax.wake.equilibrium import spread
 from rotorjax.wake.model import free_wake
@@ -45,6 +46,26 @@ def test_rates_have_derivatives_by_the_inputs(hover):
 @pytest.fixture(scope="module")
 def grounded(uh60, coarse, hover):
     return solve(free_wake(*uh60, plane(1.0), coarse), start=hover)
+
+
+def test_half_the_pitch_is_a_way_to_the_same_wake(grounded):
+    search_ = search.Search(1e-7, None)
+    there, x = search_.by_way_of_less_pitch(search.on_host(grounded.model))
+    assert search_.ok, search_.why
+    assert float(there.operating.collective) == float(grounded.model.operating.collective)
+    np.testing.assert_allclose(x.gamma_bound, grounded.state.gamma_bound, rtol=1e-5)
+
+
+def test_iterations_that_close_in_go_on_beyond_their_limit(grounded, monkeypatch):
+    model = search.on_host(grounded.model)
+    guess = jax.tree.map(lambda a: np.asarray(a) * (1 + 1e-3), grounded.unknowns)
+    whole = search.Search(1e-9, None).newton(model, guess, 1e-9)
+    assert whole.converged
+    assert whole.iterations > 1
+    monkeypatch.setattr(search, "MOST", 1)
+    longer = search.Search(1e-9, None).newton(model, guess, 1e-9)
+    assert longer.converged
+    assert longer.iterations == len(longer.residuals) - 1 == whole.iterations
 
 
 def test_ground_raises_thrust_and_lowers_inflow(hover, grounded):
