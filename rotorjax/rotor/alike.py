@@ -7,18 +7,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from rotorjax.checks import refuse, shown
+from rotorjax.checks import known, refuse, shown
 from rotorjax.rotor.geometry import Rotor, Table
 
 
 def alike(rotor: Rotor | Sequence[Rotor], count: int) -> tuple[Rotor, ...]:
-    """One rotor for each of `count`, whose arrays can be stacked: blade tables are read at the stations of all.
+    """One rotor for each of `count`, whose arrays can be stacked: blade tables that are not as long are read at the
+    stations of all.
 
-    Raises InputError for what are no rotors or not so many, and where they differ in their number of blades, in radius,
-    in having hinges, or in the size of their airfoil tables.
+    Raises InputError for what are no rotors or not so many, and where they differ in their number of blades, in radius
+    or in the size of their airfoil tables.
 
     >>> import rotorjax as rj
-    >>> two, other = rj.rotor("knight_hefner_2")[0], rj.rotor("tn2318_2")[0]
+    >>> two = rj.rotor("knight_hefner_2")[0]
     >>> [len(kind.chord.stations) for kind in alike([two, two], 2)]
     [2, 2]
     """
@@ -30,13 +31,14 @@ def alike(rotor: Rotor | Sequence[Rotor], count: int) -> tuple[Rotor, ...]:
     if all(kind is first for kind in kinds):
         return kinds
     for what, of in _MUST_AGREE.items():
-        found = [of(kind) for kind in kinds]
+        found = [value for kind in kinds if (value := of(kind)) is not None]
         if any(value != found[0] for value in found):
             raise refuse("rotor", f"have one {what} for all", " and ".join(dict.fromkeys(map(str, found))))
     name = " and ".join(dict.fromkeys(kind.name for kind in kinds))
     tables = {
         table: np.unique(np.concatenate([np.asarray(getattr(kind, table).stations) for kind in kinds]))
         for table in ("chord", "twist", "sweep")
+        if len({len(getattr(kind, table).stations) for kind in kinds}) > 1
     }
     return tuple(
         replace(
@@ -57,6 +59,6 @@ def _at(table: Table, stations: np.ndarray) -> Table:
 
 _MUST_AGREE = {
     "number of blades": lambda rotor: rotor.blades,
-    "radius": lambda rotor: float(rotor.radius),
+    "radius": lambda rotor: float(rotor.radius) if known(rotor.radius) else None,
     "size of airfoil table": lambda rotor: [jnp.shape(leaf) for leaf in jax.tree.leaves(rotor.airfoil)],
 }

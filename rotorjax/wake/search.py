@@ -58,11 +58,12 @@ def share(model: FreeWake):
 
 @dataclass
 class Search:
-    """The way so far: whether it still goes on, why it ended, and what it took."""
+    """The way so far: whether it still goes on, whether the user ended it, why it ended, and what it took."""
 
     tol: float
     progress: Progress | None
     ok: bool = True
+    interrupted: bool = False
     why: str = ""
     iterations: int = 0
     residuals: list[float] = field(default_factory=list)
@@ -80,7 +81,7 @@ class Search:
         if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)
         here, x = self.by_way_of_less_pitch(model)
-        if self.ok:
+        if self.ok or self.interrupted:
             return here, x
         here, x = self.from_nothing(on_host(eqx.tree_at(lambda m: m.ground.height, model, np.asarray(DISTANT))))
         return self.move(here, model, x, "nearer to the ground") if self.ok else (here, x)
@@ -204,6 +205,7 @@ class Search:
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""
         self.iterations += found.iterations
+        self.interrupted = found.interrupted
         self.residuals.extend(found.residuals)
         if self.progress is not None:
             self.progress(stage, found.residual)

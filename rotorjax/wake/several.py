@@ -185,8 +185,8 @@ def _over(model: FreeWake, surfaces: Panels | None, place: np.ndarray, axes: np.
     """A rotor's own model over its floor among surfaces. Raises InputError where they cut its disk."""
     if surfaces is None:
         return model
-    order = slice(None) if np.linalg.det(axes) > 0 else slice(None, None, -1)  # mirrored corners run the other way
-    seen = Panels((surfaces.corners - place)[:, order] @ axes)
+    turn = axes * np.array([1.0, np.sign(np.linalg.det(axes)), 1.0])  # not mirrored, which would turn panels inside out
+    seen = Panels((surfaces.corners - place) @ turn)
     check_clear(seen)
     return replace(model, over=floor(seen, model.ground))
 

@@ -223,6 +223,13 @@ def test_kinds_may_differ_in_chord_and_twist(uh60, alone):
     np.testing.assert_allclose(twins, of(kind, kind), rtol=1e-10)
     assert 1.1 < found[1].sum() / found[0].sum() < 4 / 3
 
+    @jax.jit
+    def widths(factor):
+        wider = eqx.tree_at(lambda rotor: rotor.chord.values, kind, kind.chord.values * factor)
+        return several_wakes([kind, wider], operating, [(0, 0, 0), (3, 0, 0)]).wakes.rotor.chord.values
+
+    np.testing.assert_allclose(widths(4 / 3)[1], wide.chord.values)
+
 
 def test_a_traced_pair_is_sent_to_its_derivative(uh60):
     def thrust(height):
