@@ -2,14 +2,17 @@
 
 Parts: quadrotor (one periodic hover at h = 1, hubs 2.5 R apart: seconds from an empty process, residual, the air that
 comes up in the middle), heights (thrust at one collective over height, of the single rotor, of two side by side and of
-four), edge (two rotors, one over a deck, one beside it). Knight and Hefner's two-bladed rotor at 8°, senses
-alternating; the wakes of `SETTINGS` keep all to minutes, `--default` takes those of `rj.several_wakes`.
+four), edge (two rotors, one over a deck, one beside it), march (the four marched from their periodic wake, for a
+revolution as they are and then with diagonal pairs 3 % faster and slower: a yaw command). Knight and Hefner's
+two-bladed rotor at 8°, senses alternating; the wakes of `SETTINGS` keep all to minutes, `--default` takes those of
+`rj.several_wakes`.
 
 For cold times: `JAX_COMPILATION_CACHE_DIR=$(mktemp -d) python benchmarks/several.py --parts quadrotor --default`.
 """
 
 import argparse
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -29,6 +32,7 @@ HALF = 1.25
 SINGLE = [(0.0, 0.0, 0.0)]
 PAIR = [(0.0, -HALF, 0.0), (0.0, HALF, 0.0)]
 QUAD = [(-HALF, -HALF, 0.0), (-HALF, HALF, 0.0), (HALF, HALF, 0.0), (HALF, -HALF, 0.0)]
+YAW = 0.03
 HEIGHTS = (3.0, 2.0, 1.5, 1.0, 0.75)
 
 
@@ -132,7 +136,47 @@ def edge(settings, out: Path | None) -> dict:
     return row
 
 
-PARTS = {"quadrotor": quadrotor, "heights": heights, "edge": edge}
+def march(settings, out: Path | None) -> dict:
+    """How far the march leaves the periodic wake in a revolution, what a yaw command does in two, and a step's time."""
+    solved = rj.solve(rotors(QUAD, 1.0, settings))
+    began = time.perf_counter()
+    marched = rj.march(solved)
+    row = {"converged": solved.converged, "compile_seconds": time.perf_counter() - began}
+    turn, state, rows = marched.steps_per_turn, marched.start, []
+    began = time.perf_counter()
+    for k in range(3 * turn):
+        command = marched.inputs if k < turn else replace(marched.inputs, omega=1 + YAW * np.array([1, -1, 1, -1]))
+        state = marched.step(state, command)
+        rows.append(np.stack([state.y.thrust, state.y.power]))
+    found = np.array(rows)  # (steps, thrust and power, rotors)
+    row |= {"steps_per_turn": turn, "ms_a_step": 1e3 * (time.perf_counter() - began) / len(rows)}
+    row["drift_in_a_turn"] = float(np.abs(found[:turn, 0].mean(axis=0) / solved.CT - 1).max())
+    last = found[-turn:].mean(axis=0)
+    row |= {"CT_after_yaw": last[0].tolist(), "CP_after_yaw": last[1].tolist()}
+    row["ripple"] = float((np.ptp(found[:turn, 0], axis=0) / solved.CT).max())
+    print(json_text({"march": row}), flush=True)
+    if out is not None:
+        draw_march(found, turn, solved, out / "yaw.png")
+    return row
+
+
+def draw_march(found, turn: int, solved, path: Path) -> None:
+    """Thrust and power of each rotor over the revolutions."""
+    turns = np.arange(len(found)) / turn
+    with style():
+        figure = new_figure(9.0, 3.6)
+        for k, (name, rest) in enumerate((("C_T", solved.CT), ("C_P", solved.CP))):
+            axes = figure.add_subplot(1, 2, k + 1)
+            for i, (x, y, _) in enumerate(QUAD):
+                where = f"{'aft' if x > 0 else 'fore'}, {'starboard' if y > 0 else 'port'}"
+                axes.plot(turns, found[:, k, i] / rest[i], label=where, ls="-" if i < 2 else "--")
+            axes.axvline(1, color="#555555", lw=0.8)
+            axes.set(xlabel="revolutions", ylabel=f"${name}$ over that of the periodic wake")
+        legend_below(figure.axes[0], 2)
+    save_file(figure, path)
+
+
+PARTS = {"quadrotor": quadrotor, "heights": heights, "edge": edge, "march": march}
 
 
 def main() -> None:

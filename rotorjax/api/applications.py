@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from rotorjax.api.several import SolvedTogether
 from rotorjax.api.solved import Solved
 from rotorjax.checks import refuse
 from rotorjax.errors import InputError
@@ -15,13 +16,17 @@ from rotorjax.wake.solution import Solution
 if TYPE_CHECKING:
     import xarray as xr
 
+    from rotorjax.coupled import CoupledState, Outputs
     from rotorjax.linearisation.handover import Time
     from rotorjax.ode.models import LinearModel, PeriodicModel
+    from rotorjax.rotor.hub import RotorInputs
     from rotorjax.simulation.linear_march import LinearMarch
     from rotorjax.simulation.march import March
     from rotorjax.simulation.run import Simulated
     from rotorjax.sweep.case import SweepCase
     from rotorjax.trim.run import Request, Result
+    from rotorjax.wake.performance import Performance
+    from rotorjax.wake.several_dynamics import SeveralInputs, SeveralState
 
 Progress = Callable[[str, float], None]
 
@@ -167,18 +172,24 @@ def sweep(case: "str | Path | SweepCase", folder: str | Path, jobs: int = 1) -> 
 
 
 @overload
-def march(about: "Result", steps_per_turn: int | None = None, **options: Any) -> "March": ...
+def march(
+    about: "Result", steps_per_turn: int | None = None, **options: Any
+) -> "March[CoupledState, Outputs, RotorInputs]": ...
+@overload
+def march(
+    about: SolvedTogether, steps_per_turn: int | None = None, **options: Any
+) -> "March[SeveralState, Performance, SeveralInputs]": ...
 @overload
 def march(about: "LinearModel | PeriodicModel", steps_per_turn: int | None = None) -> "LinearMarch": ...
 def march(
-    about: "Result | LinearModel | PeriodicModel", steps_per_turn: int | None = None, **options: Any
+    about: "Result | SolvedTogether | LinearModel | PeriodicModel", steps_per_turn: int | None = None, **options: Any
 ) -> "March | LinearMarch":
-    """Compile a march of a trim with any inflow, or of its linear model, to be stepped inside a simulator's loop at a
-    fixed cost.
+    """Compile a march of a trim with any inflow, of several rotors that were solved together, or of a linear model, to
+    be stepped inside a simulator's loop at a fixed cost.
 
     steps_per_turn: of a revolution, None for what the inflow needs. options: of `simulation.march.march`: precision,
-    old_age, batch, bound_filter, surfaces; a linear model has none. Raises InputError where the steps are too few, with
-    the number that is enough, and for a linear model that is not of `rj.linearise`.
+    old_age, batch, bound_filter, surfaces; of several rotors precision; a linear model has none. Raises InputError
+    where the steps are too few, with the number that is enough, and for a linear model that is not of `rj.linearise`.
 
     >>> import rotorjax as rj
     >>> level = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", advance=0.15)
@@ -195,11 +206,17 @@ def march(
             raise InputError(f"Argument `{next(iter(options))}` is of a march of the rotor: a linear model has none")
         return linear_march(about, steps_per_turn)
     from rotorjax.simulation.march import march
+    from rotorjax.simulation.several_march import several_march
     from rotorjax.trim.run import Result
 
+    if isinstance(about, SolvedTogether):
+        unknown = [name for name in options if name != "precision"]
+        if unknown:
+            raise InputError(f"Argument `{unknown[0]}` is of a march of one rotor: several have `precision` alone")
+        return several_march(about.found, steps_per_turn, **options)
     if not isinstance(about, Result):
-        raise refuse("about", "be a trim of one rotor (rj.trim) or its linear model", f"a {type(about).__name__}")
-
+        rule = "be a trim of one rotor (rj.trim), several rotors solved (rj.several_wakes) or a linear model"
+        raise refuse("about", rule, f"a {type(about).__name__}")
     return march(about, steps_per_turn, **options)
 
 

@@ -15,7 +15,7 @@ through the sum before. Seen from the blades that changes slowly; it is four fif
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Generic, Literal, Protocol, TypeVar, get_args
 
 import equinox as eqx
 import jax
@@ -42,38 +42,62 @@ with jax 0.11.2, which then miscompiles (tests/canary.py `wide`): a fine wake's 
 """
 
 
-class MarchState(eqx.Module):
+class Turned(Protocol):
+    """Inputs that hold rotor speeds over the nominal one."""
+
+    @property
+    def omega(self) -> Any:
+        """Ω/Ω_ref."""
+        ...
+
+
+X = TypeVar("X")  # state
+Y = TypeVar("Y")  # outputs
+U = TypeVar("U", bound=Turned)
+
+
+class MarchState(eqx.Module, Generic[X, Y]):
     """Where a march stands. x: state, azimuth from 0 to 2π. y: outputs at the start of the step that led here, NaN
     before the first. steps: made so far. finite: whether all of x is. old (2, B, N, 3): what closure and ground induced
     when they were summed last and before, None where every stage does it; every (static): steps from one sum to the
-    next. Arrays have a leading axis in a march of several.
+    next. Arrays have a leading axis in a batch of marches.
     """
 
-    x: CoupledState
-    y: Outputs
+    x: X
+    y: Y
     steps: Int[Array, ""]
     finite: Bool[Array, ""]
     old: Float[Array, "2 B N 3"] | None = None
     every: int = eqx.field(static=True, default=1)
 
 
-def begun(x: CoupledState, u: RotorInputs, p: Coupled, old_age: OldAge) -> MarchState:
+def begun(x: CoupledState, u: RotorInputs, p: Coupled, old_age: OldAge) -> MarchState[CoupledState, Outputs]:
     """State of a march before its first step."""
-
-    def none(of: PyTree) -> Any:
-        return jax.tree.map(lambda v: jnp.full(v.shape, jnp.nan, v.dtype), of)
-
-    y = jax.eval_shape(lambda: rate_and_output(jnp.zeros(()), x, u, p)[1])
+    y = unknown(lambda: rate_and_output(jnp.zeros(()), x, u, p)[1])
     old = None
     if isinstance(p, CoupledWake) and old_age != "stage":
-        old = none(jax.eval_shape(lambda: jnp.stack([old_induced(x, u, p)] * 2)))
+        old = unknown(lambda: jnp.stack([old_induced(x, u, p)] * 2))
     every = 2 if old_age == "two steps" else 1
-    return MarchState(x, none(y), jnp.zeros((), jnp.int32), jnp.ones((), bool), old, every)
+    return MarchState(x, y, jnp.zeros((), jnp.int32), jnp.ones((), bool), old, every)
+
+
+def unknown(made: Callable[[], Y]) -> Y:
+    """NaN in place of every number that a function would make."""
+    return jax.tree.map(lambda v: jnp.full(v.shape, jnp.nan, v.dtype), jax.eval_shape(made))
+
+
+def all_finite(x: PyTree) -> Bool[Array, ""]:
+    """Whether every number of a state is finite."""
+    return jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(x)]).all()
 
 
 def advance(
-    state: MarchState, t: Float[Array, ""], dt: Float[Array, ""], inputs: Callable[[Array], RotorInputs], p: Coupled
-) -> MarchState:
+    state: MarchState[CoupledState, Outputs],
+    t: Float[Array, ""],
+    dt: Float[Array, ""],
+    inputs: Callable[[Array], RotorInputs],
+    p: Coupled,
+) -> MarchState[CoupledState, Outputs]:
     """One step of dt from Ω_ref t; inputs: of Ω_ref t, asked for at each stage."""
     sums = None if state.old is None else _summed(state, inputs(t), p)
     since = state.steps % state.every
@@ -85,7 +109,7 @@ def advance(
         return rate_and_output(s, x, inputs(s), p, old)
 
     x, y = _told_step(rate, t, state.x, dt, p)
-    finite = jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in jax.tree.leaves(x)]).all()
+    finite = all_finite(x)
     x = eqx.tree_at(lambda x: x.psi, x, jnp.mod(x.psi, 2 * np.pi))
     return MarchState(x, y, state.steps + 1, finite, sums, state.every)
 
@@ -190,25 +214,26 @@ def stretch(
 
 
 @dataclass(frozen=True)
-class March:
-    """A compiled march. start: state to begin with. inputs: of the trim, to be changed from step to step; in a march
-    of several, with a leading axis as the states. seconds: that a step stands for, at the nominal rotor speed. fastest:
-    rotor speed over that up to which the steps are enough for a free wake.
+class March(Generic[X, Y, U]):
+    """A compiled march. start: state to begin with. inputs: of the trim, to be changed from step to step; in a batch,
+    with a leading axis as the states. seconds: that a step stands for, at the nominal rotor speed. fastest: rotor speed
+    over that up to which the steps are enough for a free wake.
     """
 
-    start: MarchState
-    inputs: RotorInputs
+    start: MarchState[X, Y]
+    inputs: U
     steps_per_turn: int
     seconds: float
     precision: Precision
     fastest: float
-    _program: Callable[[MarchState, RotorInputs], MarchState]
+    _program: Callable[[MarchState[X, Y], U], MarchState[X, Y]]
 
-    def step(self, state: MarchState, controls: RotorInputs | None = None) -> MarchState:
+    def step(self, state: MarchState[X, Y], controls: U | None = None) -> MarchState[X, Y]:
         """The state after one step with controls held over it (None: the trim's). Waits for the result.
 
         Raises FloatingPointError where it is not finite; the state that was given is the last one that is. Raises
-        InputError where the rotor is too fast for the steps, with the number that is enough.
+        InputError where the rotor is too fast for the steps, with the number that is enough, and for controls of
+        another shape.
         """
         controls = self.inputs if controls is None else self._checked(controls)
         found = jax.block_until_ready(self._program(state, controls))
@@ -218,8 +243,11 @@ class March:
             )
         return found
 
-    def _checked(self, controls: RotorInputs) -> RotorInputs:
+    def _checked(self, controls: U) -> U:
         """Controls in the march's precision, of a rotor speed that the steps can follow."""
+        given, wanted = ([np.shape(v) for v in jax.tree.leaves(tree)] for tree in (controls, self.inputs))
+        if given != wanted:
+            raise InputError(f"Argument `controls` must be made of `inputs`, arrays of {wanted}, but holds {given}")
         if (speed := float(np.max(controls.omega))) > self.fastest:
             steps = self.steps_per_turn
             raise InputError(
@@ -245,7 +273,7 @@ def march(
     batch: int | None = None,
     bound_filter: Literal["pass", "solution"] = "solution",
     surfaces: Panels | None = None,
-) -> March:
+) -> March[CoupledState, Outputs, RotorInputs]:
     """March a trim with any inflow, one step at a time (the module tells how).
 
     steps_per_turn: of a revolution, None for what the wake needs, at least 24, or 120 without one. old_age: what a free

@@ -44,7 +44,7 @@ def steps_per_turn(case: SimulationCase, start: Start) -> int:
 def check_steps(case: SimulationCase) -> None:
     """Raise InputError, before the trim's work, where a case's steps are too few for the ages of its free wake."""
     if case.steps_per_turn is not None and case.request.inflow == FREE_WAKE:
-        _check(case, _twelfths(_of_ages(settings_of(case)) * _fastest(case)))
+        _check(case, twelfths(steps_of_ages(settings_of(case)) * _fastest(case)))
 
 
 def _fastest(case: SimulationCase) -> float:
@@ -71,7 +71,7 @@ def least_steps(start: Start, speed: float = 1.0) -> int:
 
     speed: the highest of the rotor over the nominal one, of whose revolution the steps are.
     """
-    return max(1, _twelfths(stable_steps(start) * speed))
+    return max(1, twelfths(stable_steps(start) * speed))
 
 
 def stable_steps(start: Start) -> float:
@@ -82,17 +82,18 @@ def stable_steps(start: Start) -> float:
     """
     if not isinstance(start.p, CoupledWake):
         return 0.0
-    of_ages = _of_ages(start.p.settings)
+    of_ages = steps_of_ages(start.p.settings)
     if start.p.settings.bound_filter == "solution":
         return of_ages
     return max(of_ages, 2 * np.pi * fastest_decay(start.x, start.inputs, start.p) / STABLE)
 
 
-def _of_ages(settings: WakeSettings) -> float:
+def steps_of_ages(settings: WakeSettings) -> float:
+    """Steps of a revolution with which the transport along wake age is just stable."""
     return settings.steps_per_turn / AGES
 
 
-def _twelfths(steps: float) -> int:
+def twelfths(steps: float) -> int:
     """The multiple of twelve that is enough."""
     return 12 * int(np.ceil(steps / 12 - 1e-9))
 

@@ -237,7 +237,8 @@ def _mixed(age: Float[np.ndarray, " S"]) -> Float[Array, " S"]:
 def cores(model: FreeWake, tip_strength: Float[Array, ""], ages: Float[np.ndarray, " S"]) -> Float[Array, "F S"]:
     """Core radii over R of far segments of these ages (Eq. 16): r₀ at the blade, growing with the vortex's strength."""
     settings = model.settings
-    tip = core_radius(jnp.asarray(ages), settings.tip_core, tip_strength, model.viscosity, settings.turbulence)
+    aged = jnp.asarray(ages)
+    tip = core_radius(aged, settings.tip_core, tip_strength, model.viscosity, settings.turbulence, model.speed)
     tip = jnp.sqrt(tip**2 + (settings.spreading * _mixed(ages)) ** 2)
     # a smooth maximum: the inboard line stands for a sheet and is never thinner than that
     inner = jnp.sqrt(tip**2 + settings.inboard_core**2)

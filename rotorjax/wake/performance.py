@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.rotor.blade_element import rotor_coefficients
+from rotorjax.rotor.blade_element import SectionLoads, rotor_coefficients
 from rotorjax.wake.equilibrium import Evaluation
 from rotorjax.wake.model import FreeWake
 
@@ -22,8 +22,13 @@ class Performance(NamedTuple):
 
 def performance(model: FreeWake, found: Evaluation) -> Performance:
     """Performance of the rotor in a wake, mean over its azimuths."""
-    mean = disk_mean(model, -found.velocities.control[..., 2])
-    return Performance(*rotor_coefficients(model.rotor, found.loads, model.stations, model.widths), mean)
+    return performance_in(model, found.velocities.control, found.loads)
+
+
+def performance_in(model: FreeWake, control: Float[Array, "K R 3"], loads: SectionLoads) -> Performance:
+    """Performance from the air's velocity at the control points and the blades' loads in it."""
+    mean = disk_mean(model, -control[..., 2])
+    return Performance(*rotor_coefficients(model.rotor, loads, model.stations, model.widths), mean)
 
 
 def disk_mean(model: FreeWake, inflow: Float[Array, "K R"]) -> Float[Array, ""]:

@@ -34,7 +34,7 @@ from rotorjax.wake.arrangement import axes_of, check_apart, places_of, senses_of
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.dynamics import inputs_of
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, full_state, transported
-from rotorjax.wake.field import at_instants, from_hub, node_velocities, targets_of, to_hub, wake_segments
+from rotorjax.wake.field import Velocities, at_instants, from_hub, node_velocities, targets_of, to_hub, wake_segments
 from rotorjax.wake.loads import blade_loads
 from rotorjax.wake.model import FreeWake, WakeState, among_settings, check_surfaces, free_wake
 from rotorjax.wake.performance import Performance, performance
@@ -205,17 +205,22 @@ def _check_ground(place: np.ndarray, shafts: np.ndarray, ground: Plane | None) -
 def evaluate(several: SeveralWakes, x: Unknowns) -> Evaluation:
     """States, velocities and loads of all rotors in one another's flow; every array with a leading axis N."""
     state, start = eqx.filter_vmap(full_state)(several.wakes, x)
+    velocities = velocities_in(several, state)
+    loads = eqx.filter_vmap(lambda m, v, gamma: blade_loads(m, v, gamma, inputs_of(m)))(
+        several.wakes, velocities.control, x.gamma_bound
+    )
+    return Evaluation(state, velocities, loads, start)
+
+
+def velocities_in(several: SeveralWakes, state: WakeState) -> Velocities:
+    """Velocities at each rotor's control points and nodes in the flow of all, leading axis N."""
     own = jax.lax.map(lambda one: node_velocities(*one), (several.wakes, state, several.phases))
     added = several.coupling * interference(several, state)
     if several.surfaces is not None:
         added = added + answer(several, state)
     ends = np.cumsum([own.control.shape[2], np.prod(own.near.shape[2:4])])
     parts = jnp.split(added, ends, axis=2)
-    velocities = jax.tree.map(lambda v, more: v + more.reshape(v.shape), own, type(own)(*parts))
-    loads = eqx.filter_vmap(lambda m, v, gamma: blade_loads(m, v, gamma, inputs_of(m)))(
-        several.wakes, velocities.control, x.gamma_bound
-    )
-    return Evaluation(state, velocities, loads, start)
+    return jax.tree.map(lambda v, more: v + more.reshape(v.shape), own, Velocities(*parts))
 
 
 def interference(several: SeveralWakes, state: WakeState) -> Float[Array, "N K T 3"]:
