@@ -5,8 +5,8 @@ the harmonics of everything and the differential coordinates that act through th
 own. Where enough is left, its first three states are turned into the mean and the gradients of the inflow.
 
 A wake in slow flight grows where the blades are held still, and is damped with them; and its harmonics move its mean.
-So a second small model is taken from the harmonics of the motion, balanced as parts of the whole, and the better one
-of both kept.
+Where the small model grows, a second one is taken from the harmonics of the motion, balanced as parts of the whole,
+and the better one of both kept.
 """
 
 from dataclasses import dataclass, replace
@@ -81,12 +81,13 @@ def compact(
     model: LinearModel, order: int, truth: Complex[np.ndarray, "W q m"], motion: LinearModel | None = None
 ) -> Compact:
     """Reduce a rotor's time-invariant model. truth: responses at `frequencies()` that it is measured against. motion:
-    of `motion_of`, from which the small model is taken where that is better in the mean of all responses.
+    of `motion_of`, from which the small model is taken where one of the mean grows and this is better in the mean of
+    all responses.
 
     Raises InputError where the order is below the kept states.
     """
     found = [measured(reduced(model, order), truth)]
-    if motion is not None and order < min(model.order, motion.order):
+    if found[0].unstable and motion is not None and order < min(model.order, motion.order):
         kept = kept_states(motion.states)
         small = readable(balance_beside(motion, kept, order, HIGHEST).model, len(kept))
         found.append(measured(small, truth))

@@ -90,14 +90,23 @@ def periodic_of(data: xr.Dataset, notes: Notes) -> PeriodicModel:
     def names(key: str) -> tuple[str, ...]:
         return tuple(map(str, data[key].to_numpy()))
 
-    kinds = ("state", "input", "output")
+    a, b, c, d, x, u, y = (data[key].to_numpy() for key in ("A", "B", "C", "D", "x", "u", "y"))
     return PeriodicModel(
         t=data["time"].to_numpy(),
         period=float(data.attrs["period"]),
-        **{key: data[key.upper()].to_numpy() for key in ("a", "b", "c", "d")},
-        **{f"{kind}s": names(kind) for kind in kinds},
-        **{f"{kind}_units": names(f"{kind}_unit") for kind in kinds},
-        **{key: data[key].to_numpy() for key in ("x", "u", "y")},
+        a=a,
+        b=b,
+        c=c,
+        d=d,
+        states=names("state"),
+        inputs=names("input"),
+        outputs=names("output"),
+        state_units=names("state_unit"),
+        input_units=names("input_unit"),
+        output_units=names("output_unit"),
+        x=x,
+        u=u,
+        y=y,
         time=str(data.attrs["time"]),
         notes=notes,
     )
