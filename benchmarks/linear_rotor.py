@@ -15,7 +15,7 @@ Prints, for each inflow and flight:
    table and with a straight damper;
 6. with --table, an inflow identified over μ and h from the linear free wake (coarse wakes), its error over a revolution
    beside Pitt and Peters' own, and at flights held out, at a μ and at a height of their own; and at the first of these
-   the matrices between those of two other flights.
+   the matrices between those of the flights beside it.
 
     python benchmarks/linear_rotor.py [--inflow pitt-peters vpbfsm] [--order 20] [--wake] [--table DIR] [--json FILE]
 """
@@ -33,7 +33,7 @@ import numpy as np
 
 from rotorjax.io.atomic import json_text, make_folder
 from rotorjax.linearisation import flight, identified, identify, rotor, steps, wake_flight
-from rotorjax.linearisation.compact import compact, frequencies
+from rotorjax.linearisation.compact import compact, frequencies, motion_of
 from rotorjax.linearisation.condensed import Condensed, aligned
 from rotorjax.linearisation.found import CONTROLS, OUTPUTS, Wanted
 from rotorjax.linearisation.modes import modes
@@ -54,6 +54,9 @@ PAIRS = (("CT", "theta_0"), ("beta_1s", "theta_1c"), ("CT", "w"), ("M", "q"))
 MAIN = ("CT", "L", "M", "beta_0", "beta_1c", "beta_1s", "lambda_0", "lambda_1c", "lambda_1s")
 INPLANE = ("CQ", "X", "Y")
 COARSE = {"panels": 8, "age_step_deg": 20.0, "near_wake_deg": 100.0}
+SPEEDS, HEIGHTS = (0.1, 0.15, 0.2), (None, 2.0, 1.0)
+HELD_OUT = ((0.125, None), (0.175, None), (0.125, 1.4), (0.15, 1.4), (0.175, 1.4))
+"""The table's flights, and those that it has not seen: μ and height over R."""
 PARAMETERS = {
     "hinge offset": (lambda design: design[1].blade.offset, 1e-5),
     "density over inertia": (lambda design: design[1].blade.air, 1e-4),
@@ -88,7 +91,7 @@ def row(inflow, name, order):
     model, again_s = timed(lambda: rotor.linear_rotor(base, CONTROLS, OUTPUTS))
     truth = harmonic_transfer(model, frequencies())[:, 0]
     found, modes_s = timed(lambda: modes(model))
-    small, reduce_s = timed(lambda: compact(average(model), order, truth))
+    small, reduce_s = timed(lambda: compact(average(model), order, truth, motion_of(model)))
     where = {f"{q}/{m}": (model.outputs.index(q), model.inputs.index(m)) for q, m in PAIRS}
     names = STEPPED + (("height",) if result.request.height else ())
     error, main = stepped(base, names), [OUTPUTS.index(n) for n in MAIN]
@@ -206,7 +209,9 @@ def table_rows(speeds, heights, held, folder):
     print(identified.text(data))
     there = {place: in_wake(*place, near) for place in held}
     rows = [held_out(data, one) for one in there.values()]
-    ends = [flown[speed, held[0][1]] for speed in speeds if (speed, held[0][1]) in flown]
+    mu, height = held[0]
+    below, over = max(v for v in speeds if v <= mu), min(v for v in speeds if v >= mu)
+    ends = [flown[speed, height] for speed in (below, over) if height in heights]
     return {"text": identified.text(data), "held_out": rows} | matrices_between(ends, there[held[0]])
 
 
@@ -291,7 +296,7 @@ def main():
         print(json_text(rows[-1], indent=1))
     table = {}
     if chosen.table:
-        table = table_rows((0.1, 0.2), (None, 2.0, 1.0), ((0.15, None), (0.15, 1.4)), make_folder(Path(chosen.table)))
+        table = table_rows(SPEEDS, HEIGHTS, HELD_OUT, make_folder(Path(chosen.table)))
     if chosen.json:
         with open(chosen.json, "w") as file:
             file.write(json_text({"flights": rows, "derivatives": found, "identified": table}, indent=1))

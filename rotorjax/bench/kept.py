@@ -1,5 +1,6 @@
 """Finished work in files of its own: taken up again, set aside where damaged or of something else."""
 
+import hashlib
 from collections.abc import Callable
 from json import loads
 from pathlib import Path
@@ -35,9 +36,14 @@ def taken_up(
     return data if other is None else _set_aside(path, f"of another {noun} ({other})", say, noun)
 
 
-def check_same(data: xr.Dataset, fingerprint: str, table: dict[str, Any], folder: Path, noun: str) -> None:
+def fingerprint(table: dict[str, Any]) -> str:
+    """Twelve characters that change with anything of a table of settings."""
+    return hashlib.sha256(repr(sorted(table.items())).encode()).hexdigest()[:12]
+
+
+def check_same(data: xr.Dataset, ours: str, table: dict[str, Any], folder: Path, noun: str) -> None:
     """Raise InputError where a file was made with other settings than these; noun: of what the folder is for."""
-    if data.attrs.get("fingerprint") == fingerprint:
+    if data.attrs.get("fingerprint") == ours:
         return
     what = ", ".join(differences(table, loads(data.attrs.get("settings", "{}")))[:3]) or "other settings"
     raise InputError(f"{folder}: the output folder must be new or of the same {noun}, but holds one with {what}")

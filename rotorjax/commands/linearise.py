@@ -22,7 +22,7 @@ def register(commands: argparse._SubParsersAction) -> None:
         description="With a thrust: trim the rotor, linearise blades and inflow about the trim and write periodic, "
         "full and reduced models (NetCDF and .mat, in seconds and SI), a README that says how to load them, modes "
         "by name, linearise.json, report.md and report.html; several speeds or heights make a scheduled model, "
-        "written anew as each is done, beside a folder for each. "
+        "written anew as each is done, beside a folder for each; given again, the same command goes on. "
         "With --inflow freewake: flap, lag and all states of the wake, over level ground or none; in flight "
         "periodic, condensed to a hundred states; in hover, seen from the hub, a time-invariant model whose wake "
         "grows, and the reduced model says for which horizon it is, in a folder of its own beside other flights. "
@@ -61,6 +61,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     from rotorjax.commands.arguments import introduce_flights
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, identify, schedule, trim_output
+    from rotorjax.linearisation.kept import Shelf
     from rotorjax.trim.run import Result
 
     usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
@@ -72,7 +73,8 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     introduce_flights(requests)
     lost, known, small = [], [], []
     with _progress_bar() as progress:
-        for one in schedule.flights(requests, wanted, progress):
+        shelf = Shelf(out, wanted, lambda line: print(line, file=sys.stderr)) if len(requests) > 1 else None
+        for one in schedule.flights(requests, wanted, progress, shelf):
             if isinstance(one, Result):
                 lost.append(one)
                 continue

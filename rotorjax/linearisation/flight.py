@@ -9,11 +9,11 @@ from rotorjax.coupled import Coupled
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
 from rotorjax.linearisation import rotor, steps
-from rotorjax.linearisation.compact import check_order, compact, frequencies, gaps, kept_states
+from rotorjax.linearisation.compact import check_order, compact, frequencies, gaps, kept_states, motion_of
 from rotorjax.linearisation.drive import check_names, drive_of, lasting
 from rotorjax.linearisation.found import LinearRotor, Wanted, flight_notes
 from rotorjax.linearisation.hover_flight import LinearHover, hovering
-from rotorjax.linearisation.modes import modes
+from rotorjax.linearisation.modes import Mode, modes
 from rotorjax.linearisation.stages import Stages
 from rotorjax.linearisation.wake_flight import InWake, all_modes, base_in_flight, linear_in_flight
 from rotorjax.ode.harmonic import harmonic_model
@@ -45,6 +45,16 @@ class LinearFlight(LinearRotor):
     def models(self) -> dict[str, LinearModel | PeriodicModel]:
         """The periodic one too."""
         return super().models | {"periodic": self.periodic}
+
+
+@dataclass(frozen=True)
+class Dear:
+    """What takes long to find of a flight: `completed` makes the rest of it in seconds. Fields as in LinearFlight."""
+
+    periodic: PeriodicModel
+    modes: tuple[Mode, ...]
+    step_error: Float[np.ndarray, "q m"]
+    wake: InWake | None = None
 
 
 def hovers_in_wake(request: Request) -> bool:
@@ -174,14 +184,22 @@ def _flying(
         clock.done("marches")
     periodic = replace(periodic, notes={**periodic.notes, **flight_notes(result)})
     found = modes(periodic) if wake is None else all_modes(periodic, wake)
+    clock.done("modes")
+    return completed(result, Dear(periodic, found, error, wake), wanted, clock)
+
+
+def completed(result: Result, dear: Dear, wanted: Wanted, clock: Stages) -> LinearFlight:
+    """A flight with its time-invariant models. Raises InputError for harmonics that the model does not have."""
+    periodic = dear.periodic
     truth = harmonic_transfer(periodic, frequencies())[:, 0]
     held = held_harmonics(periodic, wanted.harmonics)
     full = harmonic_model(periodic, held)
-    clock.done("modes")
-    small = compact(full, wanted.order, truth)
+    small = compact(full, wanted.order, truth, motion_of(periodic))
     clock.done("reduction")
     gap = gaps(truth, full.response(frequencies()))
-    return LinearFlight(result, full, small, found, clock.seconds, periodic, held, *gap, error, wake)
+    return LinearFlight(
+        result, full, small, dear.modes, clock.seconds, periodic, held, *gap, dear.step_error, dear.wake
+    )
 
 
 def _lost(result: Result, why: str) -> Result:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from rotorjax.ode.hill import Exponents, exponents
 from rotorjax.ode.models import PeriodicModel
@@ -37,20 +38,19 @@ def modes(model: PeriodicModel) -> tuple[Mode, ...]:
     return named(exponents(model), model.states)
 
 
-def named(found: Exponents, states: tuple[str, ...], known: Mapping[int, str] | None = None) -> tuple[Mode, ...]:
-    """Name exponents by what takes part in them: a complex pair is one mode. known: families by number of exponent,
-    where the largest share is not to decide.
+def named(
+    found: Exponents, states: tuple[str, ...], known: Mapping[int, tuple[str, str]] | None = None
+) -> tuple[Mode, ...]:
+    """Name exponents by what takes part in them: a complex pair is one mode. known: what `called` says, by number of
+    exponent, where the largest share is not to decide.
     """
     shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
-    families = [family_of(state) for state in states]
+    families = np.array([family_of(state) for state in states])
     chosen = []
     for k in shown:
         part = found.participation[:, k]
-        inside = {family: np.array([one == family for one in families]) for family in dict.fromkeys(families)}
-        shares = {family: float(part[members].sum()) for family, members in inside.items()}
-        family = (known or {}).get(k, max(shares, key=lambda name: shares[name]))
-        own = np.where(inside[family], part, 0.0)
-        coordinate = _coordinate(states, own) if family != "inflow" else states[int(np.argmax(own))]
+        shares = {family: float(part[families == family].sum()) for family in dict.fromkeys(families.tolist())}
+        family, coordinate = (known or {}).get(k) or called(states, part, max(shares, key=lambda name: shares[name]))
         turns = abs(found.values[k].imag) > 1e-9 * (1 + abs(found.values[k]))
         value = complex(found.values[k]) if turns else complex(found.values[k].real)
         chosen.append((family, coordinate, value, shares, part))
@@ -59,6 +59,12 @@ def named(found: Exponents, states: tuple[str, ...], known: Mapping[int, str] | 
         Mode(name, value, shares, {states[i]: float(part[i]) for i in np.argsort(-part) if part[i] > TELLING})
         for name, (_, _, value, shares, part) in zip(names, chosen, strict=True)
     )
+
+
+def called(states: tuple[str, ...], part: Float[np.ndarray, " n"], family: str) -> tuple[str, str]:
+    """A family, and its multi-blade coordinate, or state of the inflow, that takes part most."""
+    own = np.where([family_of(state) == family for state in states], part, 0.0)
+    return family, states[int(np.argmax(own))] if family == "inflow" else _coordinate(states, own)
 
 
 def numbered(found: Sequence[Mode]) -> list[Mode]:
@@ -71,21 +77,28 @@ def numbered(found: Sequence[Mode]) -> list[Mode]:
     return told
 
 
-def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, str]:
-    """Which exponents are the blades', by family: as many as it has states, those in which it takes part most.
+def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, tuple[str, str]]:
+    """Which exponents are the blades', by family and multi-blade coordinate: as many as that has states, those in which
+    it takes part most.
 
-    A wake of a thousand states, far from normal, takes some part in everything, and more than all blades together.
+    A wake of a thousand states, far from normal, takes some part in everything, and more than all blades together: one
+    of its modes may be shared by a coordinate as much as another coordinate's own.
     """
-    known: dict[int, str] = {}
-    for family in FAMILIES.values():
-        inside = np.array([family_of(state) == family for state in states])
-        share, left = found.participation[inside].sum(axis=0), int(inside.sum())
-        for k in (int(k) for k in np.argsort(-share) if np.imag(found.values[k]) >= 0):
-            if left <= 0:
-                break
-            known[k] = family
-            pair = np.imag(found.values[k]) > 0 and np.isclose(found.values, found.values[k].conj(), rtol=1e-9).any()
-            left -= 2 if pair else 1
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, state in enumerate(states):
+        if family_of(state) != "inflow":
+            groups.setdefault((family_of(state), _coordinate_of(state)), []).append(row)
+    shares = {group: found.participation[rows].sum(axis=0) for group, rows in groups.items()}
+    left = {group: len(rows) for group, rows in groups.items()}
+    upper = [k for k, value in enumerate(found.values) if value.imag >= 0]
+    known: dict[int, tuple[str, str]] = {}
+    for group, k in sorted(((group, k) for group in groups for k in upper), key=lambda one: -shares[one[0]][one[1]]):
+        value = found.values[k]
+        turns = value.imag > 1e-9 * (1 + abs(value))
+        cost = 2 if turns and np.isclose(found.values, value.conj(), rtol=1e-9).any() else 1
+        if left[group] >= cost and k not in known:
+            known[k] = group
+            left[group] -= cost
     return known
 
 
@@ -99,9 +112,13 @@ def _coordinate(states: tuple[str, ...], part: np.ndarray) -> str:
     totals: dict[str, float] = {}
     for state, weight in zip(states, part, strict=True):
         if weight:
-            key = state.split("_")[1].rstrip("cs")
+            key = _coordinate_of(state)
             totals[key] = totals.get(key, 0.0) + float(weight)
     return max(totals, key=lambda key: totals[key])
+
+
+def _coordinate_of(state: str) -> str:
+    return state.split("_")[1].rstrip("cs")
 
 
 def _names(found: list[tuple[str, str, complex]]) -> list[str]:

@@ -18,6 +18,7 @@ from rotorjax.linearisation.flight import LinearFlight, linearise_trim
 from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.handover import Time, handed_over
 from rotorjax.linearisation.hover_flight import LinearHover
+from rotorjax.linearisation.kept import Shelf, above, folder_of
 from rotorjax.linearisation.told import roots
 from rotorjax.linearisation.trim_output import Found
 from rotorjax.ode.export import to_dataset
@@ -26,14 +27,21 @@ from rotorjax.ode.models import AZIMUTH, LinearModel
 from rotorjax.trim.run import Progress, Request, Result
 
 
-def flights(requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None) -> Iterator[Found | Result]:
+def flights(
+    requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None, shelf: Shelf | None = None
+) -> Iterator[Found | Result]:
     """Linearise one flight after another, each trimmed from the one before.
 
-    Raises InputError as `linearise_trim` does.
+    shelf: where flights are kept as they are done; what is there is not solved again (hovers in the free wake, whose
+    models take gigabytes, are). Raises InputError as `linearise_trim` does, and where the shelf holds other flights.
     """
+    kept = [None if shelf is None else shelf.take_up(request) for request in requests]
     near: Found | None = None
-    for number, request in enumerate(requests, 1):
-        last = linearise_trim(request, wanted, _of_one(progress, number, len(requests)), near)
+    for number, (request, last) in enumerate(zip(requests, kept, strict=True), 1):
+        if last is None:
+            last = linearise_trim(request, wanted, _of_one(progress, number, len(requests)), near)
+            if shelf is not None and isinstance(last, LinearFlight):
+                shelf.keep(last)
         near = near if isinstance(last, Result) else last
         yield last
 
@@ -96,7 +104,7 @@ def write(found: Sequence[Found], folder: Path, time: Time = "seconds") -> None:
     Called after every flight, so that all there is is written. Hovers in the free wake, whose states are others, are in
     their own folders alone.
     """
-    trim_output.write(found[-1], make_folder(folder / folder_of(found[-1])), time)
+    trim_output.write(found[-1], make_folder(folder / folder_of(found[-1].result.request)), time)
     flown = [one for one in found if isinstance(one, LinearFlight)]
     if not flown:
         return
@@ -126,7 +134,7 @@ def report(found: Sequence[Found], data: xr.Dataset, drawn: Sequence[str]) -> st
         "reduced: modes of the reduced model with Re λ ≥ 0. The last column is how far the linear model is from the "
         "nonlinear equations over a revolution after a step. README.md beside this page says how scheduled.nc is "
         "loaded.\n\n## Modes by name\n\n"
-        + table(("mode", *map(folder_of, flown)), _modes(data))
+        + table(("mode", *(folder_of(one.result.request) for one in flown)), _modes(data))
         + "".join(f"\n\n![Roots]({name}.png)" for name in drawn)
         + "\n"
     )
@@ -148,7 +156,8 @@ def _modes(data: xr.Dataset) -> Iterator[tuple[str, ...]]:
 
 
 def _link(found: Found) -> str:
-    return f"[{folder_of(found)}]({folder_of(found)}/report.html)"
+    name = folder_of(found.result.request)
+    return f"[{name}]({name}/report.html)"
 
 
 def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
@@ -162,7 +171,7 @@ def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
     for height in heights:
         title = "out of ground effect" if np.isinf(height) else f"h = {height:g} R"
         over = {place(one): one.modes for one in flown if _height(one) == height}
-        name = "roots" if len(heights) == 1 else f"roots_{_above(None if np.isinf(height) else height)}"
+        name = "roots" if len(heights) == 1 else f"roots_{above(None if np.isinf(height) else height)}"
         found[name] = roots(over, "advance ratio", title)
     return found
 
@@ -170,16 +179,6 @@ def pictures(flown: Sequence[LinearFlight]) -> dict[str, Figure]:
 def _height(found: LinearFlight) -> float:
     """Over R, infinite out of ground effect."""
     return np.inf if found.result.request.height is None else float(found.result.request.height)
-
-
-def folder_of(found: Found) -> str:
-    """Name of a flight's own folder."""
-    request = found.result.request
-    return f"advance_{request.advance:g}_{_above(request.height)}"
-
-
-def _above(height: float | None) -> str:
-    return "free_air" if height is None else f"height_{height:g}"
 
 
 README = """# {title}: linear models of {flights} flights

@@ -11,7 +11,7 @@ import xarray as xr
 from rotorjax.errors import InputError
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_bytes
-from rotorjax.ode.models import LinearModel, PeriodicModel
+from rotorjax.ode.models import LinearModel, Notes, PeriodicModel
 
 
 def to_control(model: LinearModel) -> Any:
@@ -82,6 +82,34 @@ def to_dataset(model: LinearModel | PeriodicModel) -> xr.Dataset:
     else:
         data |= {"x0": (("state",), model.x), "u0": (("input",), model.u), "y0": (("output",), model.y)}
     return xr.Dataset(data, coords, attrs)
+
+
+def periodic_of(data: xr.Dataset, notes: Notes) -> PeriodicModel:
+    """The periodic model that `to_dataset` was given, with its notes."""
+
+    def names(key: str) -> tuple[str, ...]:
+        return tuple(map(str, data[key].to_numpy()))
+
+    a, b, c, d, x, u, y = (data[key].to_numpy() for key in ("A", "B", "C", "D", "x", "u", "y"))
+    return PeriodicModel(
+        t=data["time"].to_numpy(),
+        period=float(data.attrs["period"]),
+        a=a,
+        b=b,
+        c=c,
+        d=d,
+        states=names("state"),
+        inputs=names("input"),
+        outputs=names("output"),
+        state_units=names("state_unit"),
+        input_units=names("input_unit"),
+        output_units=names("output_unit"),
+        x=x,
+        u=u,
+        y=y,
+        time=str(data.attrs["time"]),
+        notes=notes,
+    )
 
 
 def save_netcdf(model: LinearModel | PeriodicModel, path: str | Path) -> Path:

@@ -174,8 +174,17 @@ def balance_in_band(
     _require_order(model, order)
     if not highest > 0:
         raise InputError(f"Argument `highest` must be a positive frequency, but is {highest}")
+    right, left, singular = _balance(*_sampled(model, sample(highest, points, tail), growth))
+    keep = min(order, singular.size)
+    return Reduced(_transform(model, right[:, :keep], left[:keep], "band"), None, singular)
+
+
+def _sampled(
+    model: LinearModel, points: list[tuple[float, float]], growth: float
+) -> tuple[Float[np.ndarray, "n S"], Float[np.ndarray, "n T"]]:
+    """Roots of both Gramians by quadrature on growth + iω, inputs and outputs evened."""
     reach, see, gains = [], [], []
-    for omega, weight in sample(highest, points, tail):
+    for omega, weight in points:
         s = growth + 1j * omega
         x = model.resolvent.solve(s, model.b)
         y = model.resolvent.solve(s, model.c.T, adjoint=True)
@@ -183,9 +192,47 @@ def balance_in_band(
         reach += [np.real(x) * np.sqrt(weight), np.imag(x) * np.sqrt(weight)]
         see += [np.real(y) * np.sqrt(weight), np.imag(y) * np.sqrt(weight)]
     rows, columns = even(np.max(gains, axis=0))
-    right, left, singular = _balance(np.concatenate(reach / columns, axis=1), np.concatenate(see / rows, axis=1))
-    keep = min(order, singular.size)
-    return Reduced(_transform(model, right[:, :keep], left[:keep], "band"), None, singular)
+    return np.concatenate(reach / columns, axis=1), np.concatenate(see / rows, axis=1)
+
+
+@one_thread
+def balance_beside(
+    model: LinearModel, kept: Sequence[int], order: int, highest: float, *, points: int = 30, tail: float = 0.1
+) -> Reduced:
+    """Keep some states as they are, first in the result, and those directions of the others that the inputs reach and
+    the outputs see most in the whole model, up to the frequency `highest`.
+
+    The whole's sampled Gramians (as in `balance_in_band`), of which each part is balanced by itself (Vandendorpe & Van
+    Dooren 2008, doi:10.1007/978-3-540-78841-6_14): what grows by itself and is damped in the whole is no trouble, which
+    it is to `balance_rest`. Where the whole grows, they are sampled as far right of its fastest mode as that is of the
+    axis. States left out are dropped: nothing is exact, neither at frequency 0, and nothing bounds the error; measure
+    it. Raises InputError where `order` does not leave one of the others.
+    """
+    _require_order(model, order, len(kept) + 1, "states are kept as they are, and one of the others")
+    model, count = _first(model, kept), len(kept)
+    growth = 2 * max(0.0, float(np.real(model.resolvent.poles).max()))
+    reach, see = _sampled(model, sample(highest, points, tail), growth)
+    right, left, singular = _balance(reach[count:], see[count:])
+    free = min(order - count, singular.size)
+    v = np.asarray(scipy.linalg.block_diag(np.eye(count), right[:, :free]))
+    w = np.asarray(scipy.linalg.block_diag(np.eye(count), left[:free]))
+    return Reduced(_named_rest(_transform(model, v, w, "rest"), model, count), None, singular)
+
+
+def _first(model: LinearModel, kept: Sequence[int]) -> LinearModel:
+    """The model with the kept states before the others."""
+    first = [*kept, *np.setdiff1d(np.arange(model.order), kept)]
+    return replace(
+        model, a=model.a[np.ix_(first, first)], b=model.b[first], c=model.c[:, first], x=model.x[first],
+        states=tuple(model.states[i] for i in first), state_units=tuple(model.state_units[i] for i in first),
+    )  # fmt: skip
+
+
+def _named_rest(small: LinearModel, model: LinearModel, count: int) -> LinearModel:
+    """A reduced model whose first states are the model's own."""
+    free = small.order - count
+    names = model.states[:count] + tuple(f"rest[{i}]" for i in range(free))
+    return replace(small, states=names, state_units=model.state_units[:count] + (NO_UNIT,) * free)
 
 
 @one_thread
@@ -204,11 +251,7 @@ def balance_rest(
     Raises InputError where `order` does not leave one of the others.
     """
     _require_order(model, order, len(kept) + 1, "states are kept as they are, and one of the others")
-    first, count = [*kept, *np.setdiff1d(np.arange(model.order), kept)], len(kept)
-    model = replace(
-        model, a=model.a[np.ix_(first, first)], b=model.b[first], c=model.c[:, first], x=model.x[first],
-        states=tuple(model.states[i] for i in first), state_units=tuple(model.state_units[i] for i in first),
-    )  # fmt: skip
+    model, count = _first(model, kept), len(kept)
     a = model.a[count:, count:]
     growth = float(np.linalg.eigvals(a).real.max())
     sigma = 0.0 if growth < 0 else growth + 1 / horizon
@@ -223,10 +266,7 @@ def balance_rest(
     v, w = (np.asarray(scipy.linalg.block_diag(np.eye(count), part)) for part in (right, left))
     small = _transform(model, v, w, "rest")
     small = small if order >= small.order else _fold(small, order, "rest")
-    free = small.order - count
-    names = model.states[:count] + tuple(f"rest[{i}]" for i in range(free))
-    units = model.state_units[:count] + (NO_UNIT,) * free
-    return Reduced(replace(small, states=names, state_units=units), None, singular)
+    return Reduced(_named_rest(small, model, count), None, singular)
 
 
 def _sizes(model: LinearModel, highest: float, sigma: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

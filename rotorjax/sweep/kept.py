@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from rotorjax.bench.kept import check_same, taken_up
+from rotorjax.bench.kept import check_same, fingerprint, taken_up
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder
 from rotorjax.sweep.design import Point
@@ -29,7 +29,7 @@ class Shelf:
     @property
     def fingerprint(self) -> str:
         """Twelve characters that change with anything of the table."""
-        return hashlib.sha256(repr(sorted(self.table.items())).encode()).hexdigest()[:12]
+        return fingerprint(self.table)
 
     def open(self) -> None:
         """Make the folder. Raises InputError where it cannot be written."""

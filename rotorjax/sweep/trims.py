@@ -13,18 +13,16 @@ from rotorjax.bench.disk_fit import disk_fit
 from rotorjax.coupled import CoupledState
 from rotorjax.errors import InputError
 from rotorjax.linearisation.readings import readings
-from rotorjax.ode.outcome import Outcome
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import Point
 from rotorjax.sweep.found import Found, Progress, Start, dimensional, judged, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 from rotorjax.trim import run as trimming
-from rotorjax.trim.free_wake import first_guess
 from rotorjax.trim.in_wake import TrimmedInWake
 from rotorjax.trim.means import evaluated
 from rotorjax.trim.problem import inputs_at, node_azimuths, rates_and_outputs
-from rotorjax.trim.run import FREE_WAKE, Request, numbers
-from rotorjax.trim.solve import Trimmed, guess
+from rotorjax.trim.run import Request, numbers, restored, unknowns
+from rotorjax.trim.solve import Trimmed
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 READ = ("CT", "CP", "CP_induced", "CP_profile", "CP_parasite", "CP_damper", "figure_of_merit", "collective_deg")
@@ -66,7 +64,7 @@ def solve(prepared: Sequence[Request], start: Start | None = None, progress: Pro
 
 def _solve(request: Request, near: Start | None, progress: Progress | None) -> Found:
     try:
-        result = trimming.run(request, None if near is None else _restored(near), progress)
+        result = trimming.run(request, None if near is None else restored(near.prepared, near.found.state), progress)
     except InputError as error:
         return refused(str(error))
     told, trimmed = numbers(result), result.trimmed
@@ -77,28 +75,7 @@ def _solve(request: Request, near: Start | None, progress: Progress | None) -> F
     values |= {name: float(told[name]) for name in ("residual", "wall_time_s")}
     short = max(abs(told["CT"] / request.thrust - 1), told["load_change"])
     there = not isinstance(trimmed, TrimmedInWake) or result.verdict.word != "no solution"
-    return judged(values, _state(trimmed), result.converged, there, short, told["why"])
-
-
-def _state(trimmed: Trimmed | TrimmedInWake) -> dict[str, np.ndarray]:
-    """Unknowns of a trim, from which a neighbour's begins."""
-    if not trimmed.outcome.converged:
-        return {}
-    return {f"{k:02d}": np.asarray(leaf) for k, leaf in enumerate(jax.tree.leaves(trimmed.z))}
-
-
-def _restored(near: Start) -> Trimmed | TrimmedInWake:
-    """A neighbour's trim, of its state."""
-    state, request = near.found.state, near.prepared
-    leaves = [jnp.asarray(state[name]) for name in sorted(state)]
-    there = Outcome(None, 0.0, (), 0, True, "kept", 0.0)
-    if request.inflow == FREE_WAKE:
-        p, controls, coning = trimming.before_wake(request)
-        z = first_guess(p, controls, coning, 1, 0.0)
-        return TrimmedInWake(jax.tree.unflatten(jax.tree.structure(z), leaves), p, there, 0)
-    p, flight, residual = trimming.prepare(request)
-    z = guess(p, flight, request.azimuths)
-    return Trimmed(jax.tree.unflatten(jax.tree.structure(z), leaves), there, residual, flight, p)
+    return judged(values, unknowns(trimmed), result.converged, there, short, told["why"])
 
 
 @eqx.filter_jit

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from rotorjax.checks import check_number, check_range, refuse_choice
 from rotorjax.coupled import CoupledRotor, coupled_rotor
@@ -16,13 +17,14 @@ from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
 from rotorjax.inflow.choice import NAMES, inflow_model
 from rotorjax.limits import THRUST, check_flight, check_place
+from rotorjax.ode.outcome import Outcome
 from rotorjax.operating import OperatingPoint
 from rotorjax.panels.surface import Panels
 from rotorjax.rotor import catalogue
 from rotorjax.rotor.flap_lag import blade_of
 from rotorjax.rotor.geometry import Rotor, solidity
 from rotorjax.trim import problem
-from rotorjax.trim.free_wake import WakeTrim
+from rotorjax.trim.free_wake import WakeTrim, first_guess
 from rotorjax.trim.in_wake import TrimmedInWake, alike, trim_in_wake, wake_trim
 from rotorjax.trim.means import Means, means
 from rotorjax.trim.problem import Aim, TrimResidual, inputs_at, outputs_at
@@ -185,6 +187,38 @@ def before_wake(request: Request) -> tuple[WakeTrim, Float[Array, "3"], float]:
     own = {"settings": request.wake, "aim": request.aim}
     p = wake_trim(request.rotor, request.operating, inputs, request.thrust, **where, **own)
     return p, jnp.stack([controls.theta_0, controls.theta_1c, controls.theta_1s]), coning
+
+
+def unknowns(trimmed: Trimmed | TrimmedInWake) -> dict[str, np.ndarray]:
+    """Unknowns of a converged trim by name, to be kept; none of another."""
+    if not trimmed.outcome.converged:
+        return {}
+    return {f"{k:02d}": np.asarray(leaf) for k, leaf in enumerate(jax.tree.leaves(trimmed.z))}
+
+
+KEPT = Outcome(None, 0.0, (), 0, True, "kept", 0.0)
+"""How a trim ended that was kept, where nobody asks."""
+
+
+def restored(
+    request: Request, state: dict[str, np.ndarray], outcome: Outcome = KEPT, damping: float = 0.0
+) -> Trimmed | TrimmedInWake:
+    """The trim of a request whose unknowns were kept. damping: `azimuth_damping` that its wake needed, if any."""
+    leaves = [jnp.asarray(state[name]) for name in sorted(state)]
+    if request.inflow == FREE_WAKE:
+        p, controls, coning = before_wake(request)
+        if damping:
+            settings = replace(p.model.settings, azimuth_damping=damping)
+            p = replace(p, model=replace(p.model, settings=settings))
+        like = first_guess(p, controls, coning, 1, 0.0)
+        return TrimmedInWake(_like(like, leaves), p, outcome, outcome.iterations)
+    p, condition, residual = prepare(request)
+    like = guess(p, condition, request.azimuths)
+    return Trimmed(_like(like, leaves), outcome, residual, condition, p)
+
+
+def _like(tree: PyTree, leaves: list) -> PyTree:
+    return jax.tree.unflatten(jax.tree.structure(tree), leaves)
 
 
 def numbers(result: Result) -> dict[str, Any]:

@@ -81,22 +81,40 @@ def test_a_trimmed_rotor_at_one_speed_and_over_two(tmp_path, capsys):
     assert opens(tmp_path / "two" / "report.html", tmp_path)
 
 
-def test_an_interrupted_sweep_leaves_the_flights_that_are_done(tmp_path, monkeypatch):
+def test_an_interrupted_sweep_leaves_the_flights_that_are_done_and_goes_on(tmp_path, monkeypatch, capsys):
     line = ["linearise", "--weight", "72000", "--inflow", "uniform", "--azimuths", "16", "--inputs", "theta_0"]
-    whole = flight.linearise_trim
+    line += ["--outputs", "CT", "--advance-ratio", "0.1", "0.2", "--out", str(tmp_path)]
+    whole, done = flight.linearise_trim, []
 
     def stopped(request, *rest):
-        if request.advance > 0.15:
+        if done == [0.1] and request.advance > 0.15:
+            done.append("interrupted")
             raise KeyboardInterrupt
+        done.append(request.advance)
         return whole(request, *rest)
 
     monkeypatch.setattr("rotorjax.linearisation.schedule.linearise_trim", stopped)
-    assert (
-        main([*line, "--outputs", "CT", "--order", "13", "--advance-ratio", "0.1", "0.2", "--out", str(tmp_path)])
-        == 130
-    )
-    assert netcdf.read(tmp_path / "scheduled.nc").sizes["flight"] == 1
+    assert main([*line, "--order", "13"]) == 130
+    first = netcdf.read(tmp_path / "scheduled.nc")
+    assert first.sizes["flight"] == 1
     assert (tmp_path / "advance_0.1_free_air" / "report.md").exists()
+    told = json.loads((tmp_path / "linearise.json").read_text())["flights"][0]
+    assert main([*line, "--order", "14"]) == 0  # of the small model, which is made anew
+    assert done == [0.1, "interrupted", 0.2]
+    both = netcdf.read(tmp_path / "scheduled.nc")
+    np.testing.assert_array_equal(both.A[0], first.A[0])
+    again = json.loads((tmp_path / "linearise.json").read_text())["flights"][0]
+    assert {**again, "stages_s": 0, "reduced_order": 13} == {**told, "stages_s": 0}
+    capsys.readouterr()
+    for change, key in (("72500", "thrust"), ("72000", "azimuths")):
+        other = [change if one == "72000" else one for one in line]
+        assert main([*other, *([] if key == "thrust" else ["--azimuths", "20"]), "--order", "13"]) == 2
+        assert f"of the same sweep, but holds one with {key}" in capsys.readouterr().err
+    kept = tmp_path / "advance_0.2_free_air" / "flight.nc"
+    kept.write_bytes(kept.read_bytes()[:-9])
+    assert main([*line, "--order", "13"]) == 0
+    assert "damaged" in capsys.readouterr().err
+    assert done[3:] == [0.2]
 
 
 def test_a_wake_that_is_lost_gives_exit_code_1(tmp_path, monkeypatch, capsys):

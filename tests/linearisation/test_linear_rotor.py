@@ -14,10 +14,10 @@ from rotorjax.io import netcdf
 from rotorjax.linearisation import flight, identified, identify, steps
 from rotorjax.linearisation.compact import compact, frequencies, reduced
 from rotorjax.linearisation.found import OUTPUTS, Wanted
-from rotorjax.linearisation.modes import modes
+from rotorjax.linearisation.modes import blade_modes, modes, named
 from rotorjax.linearisation.rotor import base_of, linear_rotor
 from rotorjax.ode.harmonic import average, harmonic_model
-from rotorjax.ode.hill import harmonic_transfer
+from rotorjax.ode.hill import Exponents, harmonic_transfer
 from rotorjax.rotor.flap_lag import flap_frequency, lag_frequency
 from rotorjax.trim.run import request, run
 
@@ -132,6 +132,30 @@ def test_modes_have_names(periodic):
     assert found["regressing lag"].exponent.imag == pytest.approx(1 - found["collective lag"].exponent.imag, abs=0.01)
     assert found["progressing flap"].shares["flap"] > 0.9
     assert sum(found["coning"].shares.values()) == pytest.approx(1.0)
+
+
+def test_every_coordinate_of_the_blades_has_modes_of_its_own():
+    """Where the differential flap takes part in a wake's mode more than the cyclic flap does in its slow one."""
+    states = tuple(f"beta_{name}{rate}" for name in ("0", "1c", "1s", "D") for rate in ("", "_rate"))
+    states += tuple(f"wake[{k}]" for k in range(4))
+    upper = {
+        "differential flap": (-0.5 + 0.8j, "D", 0.39),
+        "inflow wake[0]": (-0.3 + 1.0j, "D", 0.35),
+        "coning": (-0.4 + 0.8j, "0", 0.3),
+        "progressing flap": (-0.5 + 1.9j, "1", 0.7),
+        "regressing flap": (-0.6 + 0.0j, "1", 0.21),
+        "regressing flap (2)": (-0.8 + 0.0j, "1", 0.2),
+    }
+    values, part = [], []
+    for value, coordinate, share in upper.values():
+        members = np.array([state.startswith(f"beta_{coordinate}") for state in states])
+        column = np.where(members, share / members.sum(), 0.0)
+        column[states.index("wake[0]")] = 1 - share
+        values += [value, value.conjugate()] if value.imag else [value]
+        part += [column] * (2 if value.imag else 1)
+    found = Exponents(np.array(values), np.zeros((12, 10)), np.stack(part, axis=1))
+    names = {mode.name: mode.exponent for mode in named(found, states, blade_modes(found, states))}
+    assert names == {name: value for name, (value, *_) in upper.items()}
 
 
 def test_linear_steps_are_those_of_the_nonlinear_march(fast):

@@ -6,6 +6,7 @@ from rotorjax.errors import InputError
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.reduction import (
     balance,
+    balance_beside,
     balance_in_band,
     balance_rest,
     bode_error_db,
@@ -118,6 +119,27 @@ def test_states_are_kept_where_the_others_grow():
     assert errors[32] < 1e-6
     assert errors[11] < 0.01
     assert errors[11] < errors[6]
+
+
+def test_others_that_grow_by_themselves_and_are_damped_in_the_whole():
+    """Up to 2 rad/s by half the states that balancing them as a system of their own takes, and damped."""
+    full = heat()
+    a, c = full.a.copy(), full.c.copy()
+    a[-2:, -2:] = np.array([[0.05, 1.5], [-1.5, 0.05]])
+    a[0, -1], a[-1, 0], c[0, -1] = -3.0, 3.0, 0.1
+    full, omega = model(a, full.b, c), np.geomspace(0.01, 2.0, 60)
+    assert np.linalg.eigvals(full.a[2:, 2:]).real.max() > 0.04
+    assert full.poles().real.max() < -0.01
+    small, other = (balance(full, (0, 1), 8, 2.0).model for balance in (balance_beside, balance_rest))
+    assert small.order == 8
+    assert small.states[:2] == full.states[:2]
+    np.testing.assert_allclose(small.a[:2, :2], full.a[:2, :2])
+    assert small.poles().real.max() < 0
+    errors = [bode_error_db(full, one, omega).max() for one in (small, other)]
+    assert errors[0] < 0.05
+    assert errors[0] < 0.5 * errors[1]
+    with pytest.raises(InputError, match=r"\[3, 32\]"):
+        balance_beside(full, (0, 1), 2, 2.0)
 
 
 def test_band_beats_the_whole_in_its_band():
