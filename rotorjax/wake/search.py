@@ -5,7 +5,6 @@ An axisymmetric wake is first brought near by Anderson's iteration.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -40,9 +39,6 @@ MOST, MOST_SLICES = 10, 16
 """Newton iterations at one model, of an axisymmetric wake and of all slices: what takes more is found sooner by a
 smaller step of the continuation.
 """
-
-SHORTEST = 2.0**-5
-"""Share of a step of Newton's below which a smaller step of the continuation is the better way."""
 
 CLOSING, MORE = 0.25, 5
 """Share of the residual that the last of these iterations leaves where Newton's method closes in: it gets MORE then."""
@@ -195,13 +191,14 @@ class Search:
 
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
-        linear = replace(METHOD, precondition=self.inverse, natural=True, restart=effort)
-        most = MOST if x.near.shape[0] == 1 else MOST_SLICES
-        way: dict[str, Any] = {"linear": linear, "tol": tol, "smallest_step": SHORTEST}
-        found = newton(told, x, model, max_iterations=most if effort > 1 else 1, **way)
+        level = x.near.shape[0] == 1
+        # over a slope the preconditioner is of another wake than this one, and no gauge
+        linear = replace(METHOD, precondition=self.inverse, natural=level, restart=effort)
+        most = MOST if level else MOST_SLICES
+        found = newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
         if found.converged or found.iterations < most or found.residuals[-1] > CLOSING * found.residuals[-2]:
             return found
-        last = newton(told, found.x, model, max_iterations=MORE, memory=found.memory, **way)
+        last = newton(told, found.x, model, linear=linear, tol=tol, max_iterations=MORE, memory=found.memory)
         return replace(
             last,
             iterations=found.iterations + last.iterations,
