@@ -149,7 +149,8 @@ def test_a_natural_gauge_takes_the_steps_that_a_bad_scale_forbids():
     start, bad = jnp.array([1.5, 2.25]), jnp.array([[1e3, 0.0], [1e3, 1.0]])
     linear = Krylov(precondition=inverse, natural=True, forcing=1e-9)
     even, mixed = (newton(residual, start, a, linear=linear) for a in (jnp.eye(2), bad))
-    assert even.converged and mixed.converged
+    assert even.converged
+    assert mixed.converged
     assert even.iterations == mixed.iterations == 2
     assert mixed.residuals[1] > 100 * mixed.residuals[0]
     assert newton(residual, start, bad, linear=replace(linear, natural=False)).iterations > 4
