@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from rotorjax.errors import InputError
 from rotorjax.ode.jacobian import CHUNK, dense_jacobian
-from rotorjax.ode.outcome import flat_residual
+from rotorjax.ode.outcome import Measure, flat_residual, relative_rms
 from rotorjax.ode.structure import require_like
 
 # Beyond this many corrections Broyden's inverse costs more to apply than it saves, and is stale.
@@ -73,6 +73,9 @@ class Dense:
                 memory = Factor(scipy.linalg.lu_factor(jacobian, overwrite_a=True, check_finite=False))
         return memory.solve(-value), memory
 
+    def gauge(self, place: tuple) -> None:
+        """Newton's own measure."""
+
     def retry(self, memory: Factor, fresh: bool) -> tuple[bool, None]:
         """A reused Jacobian is made anew; a new one is as good as it gets."""
         return not fresh, None
@@ -126,8 +129,10 @@ class Krylov:
     restart: Krylov vectors before a restart; a short one stagnates on wake-like spectra, so it is long. restarts: how
     often. precondition(v, x, *args): pytree map close to J⁻¹ v, or None. forcing: largest relative tolerance of the
     linear solve, tightened as Newton converges (Eisenstat & Walker 1996, doi:10.1137/0917003, choice 2). tightest: the
-    least that is tried where a direction leads nowhere. tells: the residual returns a pair, itself and something else
-    that it knows, which is kept in the `Place`.
+    least that is tried where a direction leads nowhere. natural: whether a step has to lower the preconditioned
+    residual, about the distance to the solution, in place of the residual, which a good step may raise manyfold where
+    the Jacobian is badly conditioned (Deuflhard 2011, doi:10.1007/978-3-642-23899-4). tells: the residual returns a
+    pair, itself and something else that it knows, which is kept in the `Place`.
     """
 
     restart: int = 400
@@ -136,6 +141,7 @@ class Krylov:
     forcing: float = 0.1
     tells: bool = False
     tightest: float = TIGHTEST
+    natural: bool = False
 
     def at(self, f: Callable, unravel: Callable, x: Array, args: PyTree) -> tuple[Array, Place]:
         """Value, and the linear map there."""
@@ -155,6 +161,13 @@ class Krylov:
         # when it does so, and its "batched" one and lineax's finish every cycle of `restart` products.
         d, _ = gmres(matrix, -value, rtol=rtol, restart=min(self.restart, x.size), maxiter=self.restarts, M=inverse)
         return d, Forcing(size, rtol)
+
+    def gauge(self, place: Place) -> Measure | None:
+        """Size of the preconditioned residual over that of x where that is asked for and there is a preconditioner."""
+        inverse = place.inverse if self.natural else None
+        if inverse is None:
+            return None
+        return lambda f, x: relative_rms(np.asarray(inverse(jnp.asarray(f, place.x.dtype))), x)
 
     def learn(self, memory: Forcing, step: np.ndarray, change: np.ndarray, ratio: float) -> Forcing:
         """Keep what the next forcing tolerance needs."""

@@ -22,6 +22,10 @@ class LinearSolve(Protocol):
         """Return (direction, memory) with J direction ≈ −value."""
         ...
 
+    def gauge(self, place: Any) -> Measure | None:
+        """Return the size of the residual that a step from that place has to lower, None for Newton's own measure."""
+        ...
+
     def learn(self, memory: Any, step: np.ndarray, change: np.ndarray, ratio: float) -> Any:
         """Return memory after a step that changed the residual by `change` and its size by `ratio`; None forgets."""
         ...
@@ -58,9 +62,10 @@ def newton(
 
     In single precision `tol` is at least 1e-5.
 
-    A step is halved until the residual falls (Armijo, 1e-4); where a reused Jacobian finds no descent it is made anew
-    before giving up. Numbers in `args` may change without compiling again, as long as `residual` is the same function.
-    A run that diverges, stalls or is interrupted returns the best iterate with `converged` False and says why.
+    A step is halved until the residual falls (Armijo, 1e-4), in the size that `linear` gauges it by; where a reused
+    Jacobian finds no descent it is made anew before giving up. Numbers in `args` may change without compiling again, as
+    long as `residual` is the same function. A run that diverges, stalls or is interrupted returns the best iterate with
+    `converged` False and says why.
 
     Raises InputError where x0 is not made of finite floating-point arrays or `residual` returns another structure.
     """
@@ -95,8 +100,9 @@ def _iterate(
     while not done and np.isfinite(size) and len(log.residuals) <= log.limit:
         fresh = log.memory is None
         direction, log.memory = linear.direction(place, f, log.memory)
-        share, new, (new_f, new_place), new_size = _backtrack(evaluate, measure, x, direction, size, smallest)
-        if new_size >= size:
+        gauge = linear.gauge(place) or measure
+        share, lower, new, (new_f, new_place) = _backtrack(evaluate, gauge, x, f, direction, smallest)
+        if not lower:
             again, log.memory = linear.retry(log.memory, fresh)
             if not again:
                 log.why = (
@@ -105,6 +111,7 @@ def _iterate(
                 )
                 return
             continue
+        new_size = measure(new_f, new)
         done = log.note(new, new_size)
         if share == 1:
             log.memory = linear.learn(log.memory, new - x, new_f - f, new_size / size)
@@ -115,20 +122,20 @@ def _iterate(
 
 def _backtrack(
     evaluate: Callable[[np.ndarray], tuple],
-    measure: Measure,
+    gauge: Measure,
     x: np.ndarray,
+    f: np.ndarray,
     direction: np.ndarray,
-    size: float,
     smallest: float,
-) -> tuple[float, np.ndarray, tuple[np.ndarray, Any], float]:
-    """Halve the step until the residual falls; returns share, iterate, what `evaluate` finds and the residual's size
-    of the last one tried.
+) -> tuple[float, bool, np.ndarray, tuple[np.ndarray, Any]]:
+    """Halve the step until the residual's gauge falls; returns share, whether it fell, iterate and what `evaluate`
+    finds there, of the last one tried.
     """
-    share = 1.0
+    share, size = 1.0, gauge(f, x)
     while True:
         new = x + share * direction
         found = evaluate(new)
-        new_size = measure(found[0], new)
+        new_size = gauge(found[0], new)
         if new_size <= (1 - 1e-4 * share) * size or share <= smallest:
-            return share, new, found, new_size
+            return share, new_size < size, new, found
         share /= 2

@@ -58,7 +58,10 @@ def share(model: FreeWake):
 
 @dataclass
 class Search:
-    """The way so far: whether it still goes on, whether the user ended it, why it ended, and what it took."""
+    """The way so far: whether it still goes on, whether the user ended it, why it ended, and what it took.
+
+    inverse: the preconditioner at hand. hard: whether an axisymmetric wake, which is mostly found without, needs one.
+    """
 
     tol: float
     progress: Progress | None
@@ -68,16 +71,19 @@ class Search:
     iterations: int = 0
     residuals: list[float] = field(default_factory=list)
     inverse: HarmonicInverse | None = None
+    hard: bool = False
 
     def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
         is none, and where that is lost by way of less pitch, a distant ground or the auxiliary flow.
         """
+        self.inverse = None
         found = self.from_guess(model, prescribed(model) if guess is None else guess, self.tol)
         self.note("prescribed wake", found)
         self.ok, self.why = found.converged, found.why
         if found.converged or found.interrupted:
             return model, found.x
+        self.hard = True
         if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)
         here, x = self.by_way_of_less_pitch(model)
@@ -156,7 +162,7 @@ class Search:
 
         def step(guess, s, memory):
             found = self.from_guess(at(s), guess, self.tol if s == 1 else max(self.tol, 1e-5))
-            if found.converged and 0 < s < 1:
+            if found.converged and s < 1 and (level or s > 0):
                 self.prepare(at(s), found.x)
             self.note(f"{stage} {s:.2f}", found)
             return found
@@ -164,7 +170,9 @@ class Search:
         def carry(x, here, there):
             return with_the_ground(x, at(here).floor, at(there).floor)
 
-        self.prepare(at(0.0), x)
+        level = x.near.shape[0] == 1
+        if not level:
+            self.prepare(at(0.0), x)
         steps = Steps(first, smallest, largest, easy=5)
         branch: Branch = continuation(step, x, 0.0, 1.0, steps=steps, jump=0.3, carry=carry)
         if not branch.outcomes:
@@ -183,8 +191,10 @@ class Search:
 
     def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
-        linear = replace(METHOD, precondition=self.inverse, restart=effort)
-        most = MOST if x.near.shape[0] == 1 else MOST_SLICES
+        level = x.near.shape[0] == 1
+        # over a slope the preconditioner is of another wake than this one, and no gauge
+        linear = replace(METHOD, precondition=self.inverse, natural=level, restart=effort)
+        most = MOST if level else MOST_SLICES
         found = newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
         if found.converged or found.iterations < most or found.residuals[-1] > CLOSING * found.residuals[-2]:
             return found
@@ -197,10 +207,11 @@ class Search:
         )
 
     def prepare(self, model: FreeWake, x: Unknowns) -> None:
-        """Make the preconditioner for a wake that is not axisymmetric."""
-        if x.near.shape[0] > 1:
-            about, laid = on_host(model.levelled), laid_level(x, model.floor)
-            self.inverse = harmonic_inverse(about, laid, x.near.shape[0], look(about, laid)[1])
+        """Make the preconditioner, from a wake like x that is axisymmetric, where one is needed."""
+        if x.near.shape[0] == 1 and not self.hard:
+            return
+        about, laid = on_host(model.levelled), laid_level(x, model.floor)
+        self.inverse = harmonic_inverse(about, laid, x.near.shape[0], look(about, laid)[1])
 
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -64,7 +66,7 @@ def test_broyden_needs_fewer_jacobians():
 class Counted:
     def __init__(self, inner):
         self.inner, self.fresh = inner, 0
-        self.at, self.learn, self.retry = inner.at, inner.learn, inner.retry
+        self.at, self.gauge, self.learn, self.retry = inner.at, inner.gauge, inner.learn, inner.retry
 
     def direction(self, place, value, memory):
         self.fresh += memory is None
@@ -133,6 +135,25 @@ def test_bad_input():
         Dense(reuse="often")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="chunk"):
         dense_jacobian(jnp.sin, jnp.zeros(3), chunk=0)
+
+
+def test_a_natural_gauge_takes_the_steps_that_a_bad_scale_forbids():
+    """Newton's iterates do not change as equations are mixed, A f = 0; nor does what the line search makes of them."""
+
+    def residual(x, mixed):
+        return mixed @ jnp.array([x[1] - x[0] ** 2, x[0] - 2.0])
+
+    def inverse(v, x, mixed):
+        return jnp.linalg.solve(jax.jacobian(residual)(x, mixed), v)
+
+    start, bad = jnp.array([1.5, 2.25]), jnp.array([[1e3, 0.0], [1e3, 1.0]])
+    linear = Krylov(precondition=inverse, natural=True, forcing=1e-9)
+    even, mixed = (newton(residual, start, a, linear=linear) for a in (jnp.eye(2), bad))
+    assert even.converged
+    assert mixed.converged
+    assert even.iterations == mixed.iterations == 2
+    assert mixed.residuals[1] > 100 * mixed.residuals[0]
+    assert newton(residual, start, bad, linear=replace(linear, natural=False)).iterations > 4
 
 
 def test_krylov_solves_tighter_where_a_loose_direction_leads_nowhere():
