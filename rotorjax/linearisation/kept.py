@@ -125,7 +125,8 @@ def _flight(data: xr.Dataset, request: Request, wanted: Wanted) -> LinearFlight:
     end, verdict = told["outcome"], Verdict(**told["verdict"])
     outcome = Outcome(None, end["residual"], (), end["iterations"], True, end["why"], 0.0)
     trimmed = restored(request, state, outcome, verdict.damping)
-    means = Means(**{k: np.array(v) if isinstance(v, list) else v for k, v in told["means"].items()})
+    flown: dict[str, Any] = {k: np.array(v) if isinstance(v, list) else v for k, v in told["means"].items()}
+    means = Means(**flown)
     result = Result(request, trimmed, means, verdict, json.loads(data.attrs["wall_time_s"]))
     periodic = periodic_of(data, json.loads(data.attrs["notes"]))
     modes = tuple(map(_mode, told["modes"]))
@@ -138,7 +139,7 @@ def _in_wake(data: xr.Dataset) -> InWake | None:
     if "wake" not in data.attrs:
         return None
     told = json.loads(data.attrs["wake"])
-    own = {name: np.nan if told[name] is None else told[name] for name in NUMBERS}
+    own: dict[str, Any] = {name: np.nan if told[name] is None else told[name] for name in NUMBERS}
     return InWake(
         **own,
         modes=tuple(map(_mode, told["modes"])),
@@ -153,4 +154,4 @@ def _plain(mode: Mode) -> dict[str, Any]:
 
 
 def _mode(told: dict[str, Any]) -> Mode:
-    return Mode(**told | {"exponent": complex(*told["exponent"])})
+    return Mode(told["name"], complex(*told["exponent"]), told["shares"], told["states"])

@@ -104,7 +104,8 @@ def test_an_interrupted_sweep_leaves_the_flights_that_are_done_and_goes_on(tmp_p
     both = netcdf.read(tmp_path / "scheduled.nc")
     np.testing.assert_array_equal(both.A[0], first.A[0])
     again = json.loads((tmp_path / "linearise.json").read_text())["flights"][0]
-    assert {**again, "stages_s": 0, "reduced_order": 13} == {**told, "stages_s": 0}
+    anew = {"stages_s", *(key for key in told if key.startswith("reduced_"))}
+    assert {k: v for k, v in again.items() if k not in anew} == {k: v for k, v in told.items() if k not in anew}
     capsys.readouterr()
     for change, key in (("72500", "thrust"), ("72000", "azimuths")):
         other = [change if one == "72000" else one for one in line]
