@@ -21,7 +21,7 @@ from rotorjax.potential import model as potential
 from rotorjax.wake import sensitivity
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.several import SeveralWakes
-from rotorjax.wake.solution import Solution, tip_vortices
+from rotorjax.wake.solution import Solution, submerged, tip_vortices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +70,11 @@ class Solved(eqx.Module):
     def leak(self) -> float | None:
         """Share of what a free wake blows on surfaces that goes through between their panels' middles, else None."""
         return self.found.leak if isinstance(self.found, Solution) else None
+
+    @property
+    def clearance(self) -> float | None:
+        """Height over R of a free wake's lowest node above the ground, inf without ground; None of finite states."""
+        return self.found.clearance if isinstance(self.found, Solution) else None
 
     def performance(self) -> Performance:
         """Thrust, torque and power in SI."""
@@ -150,10 +155,11 @@ def solve(model: FreeWake | FiniteState, start: Solved | None = None, **settings
     """Find the steady inflow of a rotor and what it does in it; of several rotors (`rj.several_wakes`) too.
 
     start: a solved neighbour that a free wake's search begins from. settings: of a free wake's search (`tol`,
-    `progress`). Warns where much of a wake goes through surfaces between their panels' middles (`Solved.leak`). Works
-    under jax.grad, jacfwd, vmap and jit (`wake.sensitivity.solve` says how a free wake does). Raises
-    InputError where the finite-state model finds no loading that reproduces itself; a free wake that is not found comes
-    back with `converged` False, under tracing it raises.
+    `progress`). Warns where much of a wake goes through surfaces between their panels' middles (`Solved.leak`) and
+    where nodes lie under the ground (`Solved.clearance`). Works under jax.grad, jacfwd, vmap and jit
+    (`wake.sensitivity.solve` says how a free wake does). Raises InputError where the finite-state model finds no
+    loading that reproduces itself; a free wake that is not found comes back with `converged` False, under tracing it
+    raises.
 
     >>> import jax, rotorjax as rj
     >>> uh60, hover = rj.rotor("uh60", collective_deg=18.0)
@@ -192,9 +198,11 @@ def _(model: SeveralWakes, start: "SolvedTogether | None" = None, **settings: An
 
 
 def _warn_of(found: "Solution | SeveralSolution") -> None:
-    """Warn where surfaces leak."""
-    if (words := told(found.leak)) is not None:
-        warnings.warn(words, stacklevel=4)
+    """Warn where surfaces leak and where a wake lies under the ground."""
+    under = submerged(found) if isinstance(found, Solution) and found.converged else None
+    for words in (told(found.leak), under):
+        if words is not None:
+            warnings.warn(words, stacklevel=4)
 
 
 def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) -> Float[Array, "N 3"]:

@@ -13,7 +13,7 @@ from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_c
 from rotorjax.reference import published as reference
 from rotorjax.rotor import catalogue
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
-from rotorjax.validation.measure import clearance, tip_path
+from rotorjax.validation.measure import tip_path
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.polars import ROTORS
 from rotorjax.validation.row import Against, Limits, Row, above_zero, absolute, between
@@ -70,7 +70,7 @@ def _rows_of(free: Point, grounded: tuple[Point, ...], wakes: Wakes) -> list[Row
     alone, where = wakes[free], f"{free.rotor} at {free.collective_deg:g}°"
     found = [_ratio_row(at, wakes[at], alone, where) for at in reversed(grounded) if _limits(at)]
     least = min(b - a for a, b in pairwise([alone.CT, *(wakes[at].CT for at in grounded)]))
-    lowest = min(clearance(wakes[at]) for at in grounded)
+    lowest = min(wakes[at].clearance for at in grounded)
     rise = "least rise of C_T to the next lower height at constant collective"
     found.append(Row(NAME, f"{rise}, {where}", least, above_zero(), RISE))
     solid = "height over R of the lowest wake node above the ground"

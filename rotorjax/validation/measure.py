@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from rotorjax.frames import disk_points, rotate_about_shaft
+from rotorjax.frames import disk_points
 from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
@@ -65,16 +65,6 @@ def first_harmonic(
     weights = np.where((solution.r > inner) & (solution.r < outer), solution.r * solution.widths, 0.0)
     over_azimuth = 2 * np.mean(values * np.exp(1j * solution.psi)[:, None], axis=0)
     return complex(over_azimuth @ weights / weights.sum())
-
-
-def clearance(solution: Solution) -> float:
-    """Height over R of the lowest wake node above the ground; inf without ground."""
-    ground = solution.model.ground
-    if ground is None:
-        return float("inf")
-    psi = jnp.asarray(solution.psi)[:, None]  # each slice's nodes are in its own blade's frame
-    turned = [rotate_about_shaft(v.reshape(psi.size, -1, 3), psi) for v in (solution.state.near, solution.state.far)]
-    return min(float(jnp.min(ground.distance(nodes))) for nodes in turned)
 
 
 _velocity = eqx.filter_jit(velocity)

@@ -81,6 +81,11 @@ class Solution:
         return float(_through_the_ground(self.state, self.model)) / float(np.sqrt(abs(self.CT) / 2))
 
     @property
+    def clearance(self) -> float:
+        """Height over R of the lowest wake node above the ground; inf without ground."""
+        return float("inf") if self.model.ground is None else float(lowest_node(self.state, self.model))
+
+    @property
     def leak(self) -> float | None:
         """Share of what blows on the surfaces that goes through between their panels' middles (`panels.surface.leak`);
         None without any.
@@ -166,13 +171,23 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
         found,
         **numbers,
         converged=search.ok,
-        why=search.why,
+        why=f"{search.why}, but {under}" if search.ok and (under := submerged(found)) else search.why,
         residual=displacement(change),
         load_change=abs(float(then) / numbers["CT"] - 1),
         iterations=search.iterations,
         residuals=tuple(search.residuals),
         wall_time_s=wall,
         compile_time_s=compiling,
+    )
+
+
+def submerged(found: Solution) -> str | None:
+    """What to know of a wake that lies under the ground, in one line; None of one that does not."""
+    if found.clearance >= 0:
+        return None
+    return (
+        f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses: its steps in age are "
+        "too long there; take a smaller `age_step_deg`, until little changes"
     )
 
 
@@ -226,6 +241,15 @@ def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "...
         "CP_profile": now.profile,
         "mean_inflow": now.mean_inflow,
     }
+
+
+@eqx.filter_jit
+def lowest_node(state: WakeState, model: FreeWake) -> Float[Array, ""]:
+    """Least distance of the wake's nodes from the plane, negative under it."""
+    psi = azimuths(state)[:, None]  # each slice's nodes are in its own blade's frame
+    nodes = jnp.concatenate([v.reshape(len(psi), -1, 3) for v in (state.near, state.far)], axis=1)
+    assert model.ground is not None
+    return jnp.min(model.ground.distance(rotate_about_shaft(nodes, psi)))
 
 
 @eqx.filter_jit

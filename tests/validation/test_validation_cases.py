@@ -3,20 +3,18 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
 from rotorjax.errors import InputError
-from rotorjax.ground import plane
 from rotorjax.reference.published import Hover, Path, induced_power_factor, knight_hefner
 from rotorjax.reference.published import caradonna_tung as caradonna_tung_data
 from rotorjax.rotor.catalogue import load
 from rotorjax.validation import caradonna_tung, grid, ground, momentum, polars, step
 from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.cases import CASES, chosen_cases
-from rotorjax.validation.measure import clearance, disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
+from rotorjax.validation.measure import disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor
 from rotorjax.validation.point import needed, point, twist_of
 from rotorjax.validation.row import Row, between
@@ -168,20 +166,9 @@ def test_a_straight_path_has_its_pitch():
 
 
 def test_no_ground_is_infinitely_far(coarse_hover):
-    assert clearance(coarse_hover) == np.inf
+    assert coarse_hover.clearance == np.inf
     assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
     assert ground.power_ratio(coarse_hover, coarse_hover) == 1
-
-
-def test_clearance_is_over_the_slope_as_each_blade_has_it():
-    """Two slices with one node along the blade at ψ = 0 and at π; over 45° the first is nearer."""
-    node = np.array([1.0, 0.0, -0.5]).reshape(1, 1, 3)
-    state = SimpleNamespace(near=jnp.asarray(np.stack([node, node])), far=jnp.asarray(np.stack([node, node])))
-    wake = SimpleNamespace(model=SimpleNamespace(ground=plane(2.0, 45.0)), state=state, psi=np.array([0.0, np.pi]))
-    assert clearance(wake) == pytest.approx(0.5 / np.sqrt(2))
-    wake.state.near = wake.state.far = state.near[1:]
-    wake.psi = wake.psi[1:]
-    assert clearance(wake) == pytest.approx(2.5 / np.sqrt(2))
 
 
 def test_the_power_ratio_is_that_at_constant_thrust(coarse_hover):

@@ -1,5 +1,7 @@
 """The periodic wake: it is one, it is where rhs rests, and it behaves as rotors do."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,8 +12,8 @@ from rotorjax.ground import plane
 from rotorjax.wake import search
 from rotorjax.wake.dynamics import inputs_of, rhs
 from rotorjax.wake.equilibrium import spread
-from rotorjax.wake.model import free_wake
-from rotorjax.wake.solution import solve
+from rotorjax.wake.model import WakeState, free_wake
+from rotorjax.wake.solution import lowest_node, solve, submerged
 
 
 def test_hover_converges_to_a_rotor_in_hover(hover):
@@ -79,8 +81,25 @@ def test_wake_spreads_over_the_ground_and_stays_above_it(grounded):
     path = grounded.tip_vortex[0]
     radius = np.hypot(path[:, 0], path[:, 1])
     assert radius[-1] > radius.min() + 0.1
-    assert float(jnp.min(grounded.model.ground.distance(grounded.state.far))) > 0
-    assert float(jnp.min(grounded.model.ground.distance(grounded.state.near))) > 0
+    nearest = min(float(jnp.min(grounded.model.ground.distance(v))) for v in (grounded.state.far, grounded.state.near))
+    assert nearest > 0
+    np.testing.assert_allclose(grounded.clearance, nearest, atol=1e-12)
+    assert submerged(grounded) is None
+    raised = replace(grounded, model=eqx.tree_at(lambda m: m.ground.height, grounded.model, 1.0 - nearest - 0.05))
+    assert "lowest node is 0.05 R under the ground" in submerged(raised)
+
+
+def test_clearance_is_over_the_slope_as_each_blade_has_it(coarse, uh60):
+    """Two slices with one node along the blade at ψ = 0 and at π; over 45° the first is nearer."""
+    over = free_wake(*uh60, plane(2.0, 45.0), coarse)
+    node, high = (np.array([x, 0.0, z]).reshape(1, 1, 3) for x, z in ((1.0, -0.5), (0.0, 9.0)))
+
+    def lowest(*slices):
+        nodes = jnp.asarray(np.stack(slices))
+        return float(lowest_node(WakeState(nodes, nodes, *(jnp.zeros((2, 1, 1)),) * 2, jnp.zeros((2, 1))), over))
+
+    assert lowest(node, node) == pytest.approx(0.5 / np.sqrt(2))
+    assert lowest(high, node) == pytest.approx(2.5 / np.sqrt(2))
 
 
 @pytest.mark.slow
