@@ -105,7 +105,7 @@ def hovered(case: dict[str, Any], quick: bool) -> dict[str, Any]:
     operating = replace(operating, collective=np.asarray(collective))
     ground = plane(case["height"], case["slope_deg"])
     found = solve(free_wake(rotor, operating, ground, quick_settings(**COARSE) if quick else None))
-    keys = ("converged", "residual", "load_change", "iterations", "CT")
+    keys = ("converged", "residual", "load_change", "iterations", "CT", "clearance")
     return {"verdict_text": found.why} | {key: getattr(found, key) for key in keys}
 
 

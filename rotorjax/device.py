@@ -1,5 +1,6 @@
 """Where a program will run: what suits the caches of a CPU does not suit the many lanes of an accelerator."""
 
+import os
 from contextlib import AbstractContextManager, nullcontext
 
 import jax
@@ -23,3 +24,11 @@ def full_products() -> AbstractContextManager:
     precision to ten bits, and so the slopes of a Runge-Kutta step. A CPU does not; asked for the same, it is slower.
     """
     return nullcontext() if on_cpu() else jax.default_matmul_precision("highest")
+
+
+def host_threads() -> int:
+    """Threads that XLA's programs on the CPU have, as it counts them itself: NPROC, else the cores of this process."""
+    said = os.environ.get("NPROC", "")
+    if said.isdigit():
+        return int(said)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -15,9 +15,9 @@ from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
 if "PYTEST_XDIST_WORKER" in os.environ:
-    # one thread for XLA, too, read when jax starts: several wait for each other with their eyes open, which took an
-    # eighth of the processor's time where programs are compiled and a quarter where a wake is solved
-    os.environ.setdefault("NPROC", "1")
+    # XLA's threads look for work with their eyes open, the shorter the more they are: a seventh of the time that a wake
+    # takes; read when jax starts. One alone would be best, but waits for itself where a program calls the host
+    os.environ.setdefault("NPROC", "8")
 # XLA's older way to write fused loops and LLVM's first level: the same sums, and half to compile; read when jax starts.
 # Level 0 halves that again, but its programs run three times as long: for all but the study and what runs long. A
 # program is one module for LLVM and not 32: a third less, where the workers keep all cores busy

@@ -10,6 +10,7 @@ import pytest
 
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
+from rotorjax.wake import sensitivity
 from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.performance import performance
@@ -76,3 +77,10 @@ def test_only_converged_axisymmetric_wakes_have_a_derivative(grounded):
     lost = replace(grounded, converged=False, why="lost")
     with pytest.raises(InputError, match="lost"):
         periodic_wake(lost, grounded.model)
+
+
+def test_one_thread_would_wait_for_itself(uh60, coarse, monkeypatch):
+    """XLA's only thread is the caller's program, which waits for the search's."""
+    monkeypatch.setenv("NPROC", "1")
+    with pytest.raises(InputError, match="set NPROC=2 in the environment"):
+        jax.jit(lambda height: sensitivity.solve(free_wake(*uh60, plane(height), coarse)).CT)(1.0)
