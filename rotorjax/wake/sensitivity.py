@@ -33,8 +33,8 @@ def solve(
     output); batches are solved one after the other; under jit the search is a call to the host.
 
     Raises InputError under tracing where the search does not converge, since then there is nothing to differentiate
-    (under jit: a runtime error with the same words), and under jit with one thread for XLA (one core, or NPROC=1), which
-    may wait for ever.
+    (under jit: a runtime error with the same words), and under jit with one thread for XLA (one core, or NPROC=1),
+    which may wait for ever.
     """
     if known(model):
         return on_host.solve(model, start, progress, tol)
@@ -46,8 +46,8 @@ def solve(
         if host_threads() < 2:
             raise InputError(
                 "A free wake solved under jax.jit calls the host, whose programs may wait for ever for the only "
-                "thread that XLA has on one core: set NPROC=2 in the environment before jax starts, or solve outside of "
-                "jax.jit"
+                "thread that XLA has on one core: set NPROC=2 in the environment before jax starts, or solve outside "
+                "of jax.jit"
             )
         numbers, rest = eqx.partition(fixed, eqx.is_array)
         x = jax.pure_callback(
