@@ -186,8 +186,8 @@ def submerged(found: Solution) -> str | None:
     if found.clearance >= 0:
         return None
     return (
-        f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses: its steps in age are "
-        "too long there; take a smaller `age_step_deg`, until little changes"
+        f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses: too few nodes; take a "
+        "smaller `age_step_deg` and more `azimuths`, until little changes"
     )
 
 
