@@ -100,9 +100,12 @@ def _iterate(
     while not done and np.isfinite(size) and len(log.residuals) <= log.limit:
         fresh = log.memory is None
         direction, log.memory = linear.direction(place, f, log.memory)
-        gauge = linear.gauge(place) or measure
-        share, lower, new, (new_f, new_place) = _backtrack(evaluate, gauge, x, f, direction, smallest)
-        if not lower:
+        gauge = linear.gauge(place)
+        gauged = size if gauge is None else gauge(f, x)
+        share, new, (new_f, new_place), new_size = _backtrack(
+            evaluate, gauge or measure, x, direction, gauged, smallest
+        )
+        if new_size >= gauged:
             again, log.memory = linear.retry(log.memory, fresh)
             if not again:
                 log.why = (
@@ -111,7 +114,7 @@ def _iterate(
                 )
                 return
             continue
-        new_size = measure(new_f, new)
+        new_size = new_size if gauge is None else measure(new_f, new)
         done = log.note(new, new_size)
         if share == 1:
             log.memory = linear.learn(log.memory, new - x, new_f - f, new_size / size)
@@ -124,18 +127,18 @@ def _backtrack(
     evaluate: Callable[[np.ndarray], tuple],
     gauge: Measure,
     x: np.ndarray,
-    f: np.ndarray,
     direction: np.ndarray,
+    size: float,
     smallest: float,
-) -> tuple[float, bool, np.ndarray, tuple[np.ndarray, Any]]:
-    """Halve the step until the residual's gauge falls; returns share, whether it fell, iterate and what `evaluate`
-    finds there, of the last one tried.
+) -> tuple[float, np.ndarray, tuple[np.ndarray, Any], float]:
+    """Halve the step until the residual's gauge falls below `size`; returns share, iterate, what `evaluate` finds and
+    the gauge there, of the last one tried.
     """
-    share, size = 1.0, gauge(f, x)
+    share = 1.0
     while True:
         new = x + share * direction
         found = evaluate(new)
         new_size = gauge(found[0], new)
         if new_size <= (1 - 1e-4 * share) * size or share <= smallest:
-            return share, new_size < size, new, found
+            return share, new, found, new_size
         share /= 2
