@@ -17,8 +17,6 @@ from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
-from rotorjax.sweep import trims
-from rotorjax.sweep.found import CONVERGED, Found, Start
 from rotorjax.trim.free_wake import hub_moment, residual
 from rotorjax.trim.in_wake import (
     QUICK,
@@ -35,7 +33,7 @@ from rotorjax.trim.in_wake import (
     wake_trim,
 )
 from rotorjax.trim.means import evaluated, means
-from rotorjax.trim.run import check, numbers, request, run, table
+from rotorjax.trim.run import check, numbers, request, restored, run, table, unknowns
 from rotorjax.trim.verdict import verdict
 from rotorjax.wake.settings import flight_settings, wake_settings
 
@@ -68,8 +66,7 @@ def test_forward_flight_is_trimmed(told):
 def test_a_trim_starts_from_its_neighbour_as_from_nothing(cruise):
     """From μ = 0.2 to 0.22 and back; what a sweep keeps of a trim is the same trim."""
     aside = run(replace(cruise.request, advance=0.22), cruise.trimmed)
-    kept = Found({}, CONVERGED, trims._state(aside.trimmed))
-    back = run(cruise.request, trims._restored(Start(aside.request, kept)))
+    back = run(cruise.request, restored(aside.request, unknowns(aside.trimmed)))
     assert aside.converged
     assert back.converged
     assert aside.trimmed.iterations < 0.5 * cruise.trimmed.iterations
