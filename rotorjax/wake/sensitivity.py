@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.checks import known
-from rotorjax.device import host_threads
+from rotorjax.device import host_threads, on_cpu
 from rotorjax.errors import InputError
 from rotorjax.ode.implicit import attach
 from rotorjax.wake import solution as on_host
@@ -43,7 +43,7 @@ def solve(
     if known(fixed):
         x = jax.tree.map(jnp.asarray, _found(fixed, start, progress, tol, slices))
     else:
-        if host_threads() < 2:
+        if on_cpu() and host_threads() < 2:
             raise InputError(
                 "A free wake solved under jax.jit calls the host, whose programs may wait for ever for the only "
                 "thread that XLA has on one core: set NPROC=2 in the environment before jax starts, or solve outside "
