@@ -1,6 +1,7 @@
 """Surfaces from a few numbers, in the hub frame (x aft, y to starboard, z up), lengths over R."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +15,8 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.panels.surface import Panels
 
 Point = ArrayLike | Sequence[ArrayLike]
+
+_turned = jax.jit(rotate_about_shaft)
 
 PANEL = 0.25
 """Size over R of a panel near the shaft."""
@@ -32,13 +35,16 @@ def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
     >>> len(hangar), round(float(hangar.areas.sum()), 3)
     (52, 20.0)
     """
-    low, high = _corner("low", low), _corner("high", high)
-    if known(low, high) and not np.all(np.asarray(high - low) > 0):
-        ends = [np.asarray(v).tolist() for v in (low, high)]
-        raise refuse("high", f"lie beyond low = {ends[0]} on all axes", shown(ends[1]))
+    ends = _corner("low", low), _corner("high", high)
+    ends = (
+        tuple(map(np.asarray, ends)) if known(ends) else ends
+    )  # numpy's where numbers are known: no program to compile
+    low, high = ends
+    if known(low, high) and not np.all(high - low > 0):
+        raise refuse("high", f"lie beyond low = {low.tolist()} on all axes", shown(high.tolist()))
     lines = [_divided(low[i], high[i], panel, even=i == 2) for i in range(3)]
     faces = [_face(lines, axis, upper) for axis in range(3) for upper in (False, True)]
-    return Panels(jnp.concatenate(faces))
+    return Panels(array(_numpy_of(lines).concatenate(faces)))
 
 
 def slab(low: Point, high: Point, top: ArrayLike, thickness: ArrayLike = 0.5, panel: float = PANEL) -> Panels:
@@ -67,7 +73,7 @@ def wall(
     ends = jnp.asarray(length) / 2
     low = jnp.stack([near, -ends, jnp.asarray(bottom, float)])
     high = jnp.stack([near + thickness, ends, jnp.asarray(top, float)])
-    return Panels(rotate_about_shaft(box(low, high, panel).corners, jnp.deg2rad(jnp.asarray(azimuth_deg, float))))
+    return Panels(_turned(box(low, high, panel).corners, jnp.deg2rad(jnp.asarray(azimuth_deg, float))))
 
 
 def terrain(x: Sequence[float], y: Sequence[float], heights: ArrayLike | Sequence[Sequence[float]]) -> Panels:
@@ -120,14 +126,20 @@ def _divided(low: Array, high: Array, panel: float, *, even: bool) -> Float[Arra
 def _face(lines: list[Array], axis: int, upper: bool) -> Float[Array, "P 4 3"]:
     """Panels of the lower or upper face of a box along an axis, counter-clockwise from outside."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
-    one, other = jnp.meshgrid(lines[first], lines[second], indexing="ij")
+    xp = _numpy_of(lines)
+    one, other = xp.meshgrid(lines[first], lines[second], indexing="ij")
     parts: dict[int, Array] = {
         first: one,
         second: other,
-        axis: jnp.full_like(one, 1.0) * lines[axis][-1 if upper else 0],
+        axis: xp.full_like(one, 1.0) * lines[axis][-1 if upper else 0],
     }
-    a, b, c, d = (v.reshape(-1, 3) for v in _cells(jnp.stack([parts[i] for i in range(3)], axis=-1)))
-    return jnp.stack([a, b, c, d] if upper else [a, d, c, b], axis=1)
+    a, b, c, d = (v.reshape(-1, 3) for v in _cells(xp.stack([parts[i] for i in range(3)], axis=-1)))
+    return xp.stack([a, b, c, d] if upper else [a, d, c, b], axis=1)
+
+
+def _numpy_of(lines: list[Array]) -> Any:
+    """numpy, or jax's where a line is jax's."""
+    return jnp if any(isinstance(line, jax.Array) for line in lines) else np
 
 
 def _cells(nodes: Float[Array, "X Y 3"]) -> tuple[Array, Array, Array, Array]:
