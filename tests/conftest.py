@@ -9,15 +9,17 @@ the commands that the tests start, which get it through the environment.
 import gc
 import importlib
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 from rotorjax.cli import HAS_OLDER_WAY, WITHOUT_FREE_WAKE
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers share the cores; read when numpy is imported
 if "PYTEST_XDIST_WORKER" in os.environ:
-    # XLA's threads look for work with their eyes open, the shorter the more they are: a seventh of the time that a wake
-    # takes; read when jax starts. One alone would be best, but waits for itself where a program calls the host
-    os.environ.setdefault("NPROC", "8")
+    # two threads of XLA look for work with their eyes open, a quarter of the time that a wake takes; read when jax
+    # starts. Where a program calls the host, which has programs of its own, there must be a second one (calls_host)
+    os.environ.setdefault("NPROC", "1")
 # XLA's older way to write fused loops and LLVM's first level: the same sums, and half to compile; read when jax starts.
 # Level 0 halves that again, but its programs run three times as long: for all but the study and what runs long. A
 # program is one module for LLVM and not 32: a third less, where the workers keep all cores busy
@@ -35,6 +37,8 @@ os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")  # as the command line: XLA's
 import compiling
 import jax
 import pytest
+
+from rotorjax.device import host_threads
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 MOST_MAPPINGS = 20_000  # about 3 GB of programs and what they hold
@@ -59,6 +63,18 @@ def pytest_collection_modifyitems(items):
         return 0 if item.path.name == "test_documents.py" else 1 if item.path in slow else 2
 
     items.sort(key=order)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """Run a test in a process of its own where it needs a second thread of XLA's and this one has one."""
+    if not pyfuncitem.get_closest_marker("calls_host") or host_threads() > 1:
+        return None
+    env = {key: value for key, value in os.environ.items() if not key.startswith("PYTEST_")} | {"NPROC": "2"}
+    command = [sys.executable, "-m", "pytest", "-q", pyfuncitem.nodeid]
+    ran = subprocess.run(command, cwd=pyfuncitem.config.rootpath, env=env, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout
+    return True
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -95,6 +95,7 @@ def test_a_solved_rotor_is_read_drawn_and_written(over_ground, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.calls_host
 def test_a_free_wake_solved_and_differentiated(uh60, wake, tmp_path):
     assert wake.converged
     wake.to_vtk(tmp_path / "wake.vtk")
