@@ -17,6 +17,7 @@ from rotorjax.io.atomic import make_folder
 from rotorjax.io.scene import Scene
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.simulation.run import SAVES, Simulated
+from rotorjax.wake.above import above_ground
 from rotorjax.wake.seen import Seen, seen_slice
 
 KINDS = {"blade": 0, "tip vortex": 1, "inboard filament": 2}
@@ -28,7 +29,8 @@ def seen(x: CoupledState, u: RotorInputs, p: CoupledWake) -> Seen:
     """Look at the wakes of all blades of a state."""
     blades = blades_at(x, u, p)
     model = model_of(u, blades, p)
-    rows = (jnp.arange(p.rotor.blades), x.inflow, blades.psi, blades.theta)
+    wake = above_ground(model, x.inflow, blades.psi[0])
+    rows = (jnp.arange(p.rotor.blades), wake, blades.psi, blades.theta)
     return jax.vmap(lambda k, now, psi, theta: seen_slice(model.of_slice(k), now, psi, theta))(*rows)
 
 

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
 from rotorjax.panels.surface import leak, watched
+from rotorjax.wake.above import above_ground, senses
 from rotorjax.wake.biot_savart import segment_velocity, sharpened_velocity
 from rotorjax.wake.far_wake import faded
 from rotorjax.wake.model import FreeWake, WakeState, azimuths, slices
@@ -50,7 +51,7 @@ def wake_segments(
         near = near_lattice(own, slice_, model.settings.near_core)
         return join(near, far, bound_vortex(own, slice_.gamma_bound))
 
-    return jax.vmap(one)(state, azimuths(state, psi), jnp.arange(slices(state)))
+    return jax.vmap(one)(above_ground(model, state, psi), azimuths(state, psi), jnp.arange(slices(state)))
 
 
 def node_velocities(
@@ -77,7 +78,7 @@ def node_velocities(
     at_control, *rest = jnp.split(v, ends, axis=1)
     near, far = (part.reshape(a.shape) for part, a in zip(rest, (state.near, state.far), strict=True))
     sharpened = jax.vmap(lambda *both: _sharpened(model, *both))(control, segments)
-    bent = jax.vmap(lambda k, slice_: self_induction(model.of_slice(k), slice_))(numbers, state)
+    bent = jax.vmap(lambda k, *at: self_induction(model.of_slice(k), *at))(numbers, state, angles)
     return Velocities(at_control + sharpened, near, far + bent)
 
 
@@ -280,8 +281,8 @@ def _sharpened(model: FreeWake, control: Float[Array, "R 3"], segments: Segments
     return sharpened_velocity(control, *lattice, fine=model.settings.control_core)
 
 
-def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]:
-    """Velocity of the tip vortex's nodes from its own curvature, which straight segments lose.
+def self_induction(model: FreeWake, slice_: WakeState, angle: float | Float[Array, ""] = 0.0) -> Float[Array, "F AF 3"]:
+    """Velocity of the tip vortex's nodes from its own curvature, which straight segments lose; the slice is at `angle`.
 
     The two segments that meet in a node induce nothing there. Cutting ±Δs out of a ring of radius ρ leaves
     Γ/4πρ · ln(4ρ/Δs); the whole ring with a Lamb–Oseen core r_c has Γ/4πρ · (ln(8ρ/r_c) − 0.444) (Saffman 1992,
@@ -298,5 +299,6 @@ def self_induction(model: FreeWake, slice_: WakeState) -> Float[Array, "F AF 3"]
     binormal = jnp.cross(tangent, bend) / step**3
     log = jnp.log(2 * step / model.settings.self_induction_core) - 0.444
     strength = faded(model, slice_.gamma_far, model.settings.filament_ages[1:])[0]
+    strength = strength * senses(model, slice_.far[0], angle)
     found = strength[:, None] / (4 * jnp.pi) * log * binormal
     return jnp.pad(found[None], [(0, len(slice_.far) - 1), (0, 0), (0, 0)])

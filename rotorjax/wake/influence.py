@@ -19,6 +19,7 @@ from jaxtyping import Array, Complex, Float
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.wake import kernel_sweeps
+from rotorjax.wake.above import above_ground
 from rotorjax.wake.field import self_induction
 from rotorjax.wake.kernel_pairs import cross, pairs, slopes
 from rotorjax.wake.model import FreeWake, WakeState, along_blade, azimuths, slices
@@ -82,7 +83,7 @@ def velocity_response(model: FreeWake, state: WakeState, phase: Float[Array, ""]
         return jnp.concatenate([places, s.near.reshape(-1, 3), s.far.reshape(-1, 3)])
 
     def everything(v):
-        s = unravel(v)
+        s = _above(model, unravel(v), 0.0)
         near = near_lattice(model, s, model.settings.near_core)
         far = far_filaments(model, s, releases(model, s), jnp.zeros(()))
         return _kernel_form(join(near, far, bound_vortex(model, s.gamma_bound)))
@@ -119,7 +120,7 @@ def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -
         return rotate_about_shaft(own, angle)
 
     def everything(v, k, angle):
-        own, s = model.of_slice(k), unravel(v)
+        own, s = model.of_slice(k), _above(model, unravel(v), angle)
         far = far_filaments(own, s, releases(own, s), angle)
         whole = join(near_lattice(own, s, model.settings.near_core), far, bound_vortex(own, s.gamma_bound))
         start, end = (rotate_about_shaft(ends, angle) for ends in (whole.start, whole.end))
@@ -133,12 +134,16 @@ def instant_response(model: FreeWake, state: WakeState, psi: Float[Array, ""]) -
         own = _of_all(model, targets[k], flat, everything, k, angles)
         own = own.at[:, :, k].add(jnp.einsum("nij,njm->nim", _by_place(model, targets[k], segments), moved[k]))
         own = jnp.einsum("ij,njbm->nibm", rotate_about_shaft(jnp.eye(3), angle), own)  # back into the blade's frame
-        bend = jax.jacfwd(lambda v: self_induction(model.of_slice(k), unravel(v)))(flat[k]).reshape(
-            -1, 3, flat.shape[1]
-        )
+        bend = jax.jacfwd(lambda v: self_induction(model.of_slice(k), unravel(v), angle))(flat[k])
+        bend = bend.reshape(-1, 3, flat.shape[1])
         return own.at[len(own) - len(bend) :, :, k].add(bend)
 
     return jax.lax.map(at_blade, (numbers, angles))
+
+
+def _above(model: FreeWake, slice_: WakeState, angle: float | Float[Array, ""]) -> WakeState:
+    """One slice as its vortices lie."""
+    return jax.tree.map(lambda a: a[0], above_ground(model, jax.tree.map(lambda a: a[None], slice_), angle))
 
 
 def _require_open_air(model: FreeWake) -> None:

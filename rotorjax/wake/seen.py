@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.rotor import geometry
+from rotorjax.wake.above import above_ground
 from rotorjax.wake.far_wake import cores
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.segments import lattice_nodes, releases
@@ -52,7 +53,7 @@ def seen_slice(model: FreeWake, state: WakeState, psi: Float[Array, ""], pitch: 
 @eqx.filter_jit
 def seen_around(model: FreeWake, state: WakeState) -> Seen:
     """Look at a periodic wake of K slices at the K instants at which blade 0 stands where a slice does; (K, B, …)."""
-    psi = azimuths(state)
+    psi, state = azimuths(state), above_ground(model, state)
     pitch = jnp.broadcast_to(model.operating.collective, psi.shape)
     if model.flight is not None:
         pitch = pitch + model.flight.cyclic

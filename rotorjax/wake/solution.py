@@ -16,6 +16,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading
+from rotorjax.wake.above import above_ground
 from rotorjax.wake.clock import Clock
 from rotorjax.wake.equilibrium import Evaluation, Unknowns, displacement, evaluated, look, spread
 from rotorjax.wake.field import leaked, velocity
@@ -186,8 +187,8 @@ def submerged(found: Solution) -> str | None:
     if found.clearance >= 0:
         return None
     return (
-        f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses: too few nodes; take a "
-        "smaller `age_step_deg` and more `azimuths`, until little changes"
+        f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses, and stands for its "
+        "mirror image: too few nodes; take a smaller `age_step_deg` and more `azimuths`, until little changes"
     )
 
 
@@ -226,7 +227,7 @@ def tip_vortices(found: Solution, blades: int) -> Float[np.ndarray, "B A 3"]:
 def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
     """Fields of a solution: along blades and vortices, and of the whole rotor."""
     psi, now = azimuths(found.state), performance(model, found)
-    tip = jnp.concatenate([found.start.points[:, :1], found.state.far[:, 0]], axis=1)
+    tip = jnp.concatenate([found.start.points[:, :1], above_ground(model, found.state).far[:, 0]], axis=1)
     return {
         "r": model.stations,
         "widths": model.widths,
