@@ -13,6 +13,8 @@ FAMILIES = {"beta": "flap", "lag": "lag"}
 """By the first part of a state's name; all others are the inflow's."""
 TELLING = 0.02
 """Participation from which on a state is told."""
+LEAST = 0.1
+"""Of the part that a coordinate takes in its leading mode: with less a mode is none of its own."""
 
 
 @dataclass(frozen=True)
@@ -44,15 +46,14 @@ def named(
     """Name exponents by what takes part in them: a complex pair is one mode. known: what `called` says, by number of
     exponent, where the largest share is not to decide.
     """
-    shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
+    shown = [k for k, value in enumerate(found.values) if is_upper(value)]
     families = np.array([family_of(state) for state in states])
     chosen = []
     for k in shown:
         part = found.participation[:, k]
         shares = {family: float(part[families == family].sum()) for family in dict.fromkeys(families.tolist())}
         family, coordinate = (known or {}).get(k) or called(states, part, max(shares, key=lambda name: shares[name]))
-        turns = abs(found.values[k].imag) > 1e-9 * (1 + abs(found.values[k]))
-        value = complex(found.values[k]) if turns else complex(found.values[k].real)
+        value = complex(found.values[k]) if _turns(found.values[k]) else complex(found.values[k].real)
         chosen.append((family, coordinate, value, shares, part))
     names = _names([(family, coordinate, value) for family, coordinate, value, _, _ in chosen])
     return tuple(
@@ -78,8 +79,8 @@ def numbered(found: Sequence[Mode]) -> list[Mode]:
 
 
 def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, tuple[str, str]]:
-    """Which exponents are the blades', by family and multi-blade coordinate: as many as that has states, those in which
-    it takes part most.
+    """Which exponents are the blades', by family and multi-blade coordinate: as many as that has states at most, those
+    in which it takes part most, by no less than `LEAST` of its largest part and at one of its own frequencies.
 
     A wake of a thousand states, far from normal, takes some part in everything, and more than all blades together: one
     of its modes may be shared by a coordinate as much as another coordinate's own.
@@ -88,18 +89,44 @@ def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, tuple[st
     for row, state in enumerate(states):
         if family_of(state) != "inflow":
             groups.setdefault((family_of(state), _coordinate_of(state)), []).append(row)
-    shares = {group: found.participation[rows].sum(axis=0) for group, rows in groups.items()}
+    upper = np.array([k for k, value in enumerate(found.values) if is_upper(value)])
+    shares = {group: found.participation[np.ix_(rows, upper)].sum(axis=0) for group, rows in groups.items()}
+    frequencies, values = np.imag(found.values[upper]), found.values
+    fits = {group: _fits(group, shares, frequencies) for group in groups}
     left = {group: len(rows) for group, rows in groups.items()}
-    upper = [k for k, value in enumerate(found.values) if value.imag >= 0]
     known: dict[int, tuple[str, str]] = {}
-    for group, k in sorted(((group, k) for group in groups for k in upper), key=lambda one: -shares[one[0]][one[1]]):
-        value = found.values[k]
-        turns = value.imag > 1e-9 * (1 + abs(value))
-        cost = 2 if turns and np.isclose(found.values, value.conj(), rtol=1e-9).any() else 1
+    pairs = [(group, at) for group in groups for at in np.flatnonzero(fits[group])]
+    for group, at in sorted(pairs, key=lambda one: -shares[one[0]][one[1]]):
+        k = int(upper[at])
+        cost = 2 if _turns(values[k]) and np.isclose(values, values[k].conj(), rtol=1e-9).any() else 1
         if left[group] >= cost and k not in known:
             known[k] = group
             left[group] -= cost
     return known
+
+
+def _fits(group: tuple[str, str], shares: Mapping[tuple[str, str], np.ndarray], frequencies: np.ndarray) -> np.ndarray:
+    """Which modes may be a coordinate's: enough of it takes part, and a cyclic one turns as fast as a blade moves, more
+    or less its order, as far as the differential or collective motion tells a blade's frequency.
+    """
+    family, coordinate = group
+    enough = shares[group] >= LEAST * shares[group].max()
+    alone = [shares[family, name] for name in ("D", "0") if (family, name) in shares]
+    if coordinate in ("0", "D") or not alone:
+        return enough
+    blade, order = frequencies[np.argmax(alone[0])], int(coordinate)
+    gaps = [np.abs(frequencies - abs(blade + turn)) for turn in (-order, order)]
+    return enough & (np.minimum(*gaps) < 0.5)
+
+
+def _turns(value: complex) -> bool:
+    """Whether an exponent has a frequency, and not only what rounding leaves of none."""
+    return abs(value.imag) > 1e-9 * (1 + abs(value))
+
+
+def is_upper(value: complex) -> bool:
+    """Whether it is the one of its pair that is told, or real; rounding gives that either sign."""
+    return value.imag > 0 or not _turns(value)
 
 
 def family_of(state: str) -> str:

@@ -19,7 +19,7 @@ from rotorjax.linearisation import condensed, drive, readings, rotor, steps
 from rotorjax.linearisation.condensed import Condensed, shares_of
 from rotorjax.linearisation.found import flight_notes
 from rotorjax.linearisation.instant import instant
-from rotorjax.linearisation.modes import FAMILIES, Mode, blade_modes, called, family_of, named, numbered
+from rotorjax.linearisation.modes import FAMILIES, Mode, blade_modes, called, family_of, is_upper, named, numbered
 from rotorjax.linearisation.rotor import Base
 from rotorjax.linearisation.settled import settled
 from rotorjax.ode.hill import Exponents, exponents
@@ -189,7 +189,7 @@ def wake_modes(found: Leading, states: tuple[str, ...]) -> tuple[Mode, ...]:
     weight = np.abs(found.shares)
     known = {k: called(states, weight[:, k], kinds[int(np.argmax(sums[:, k]))]) for k in range(found.values.size)}
     modes = named(Exponents(found.values, found.shares, weight / weight.sum(axis=0)), states, known)
-    shown = [k for k, value in enumerate(found.values) if value.imag > -1e-9 * (1 + abs(value))]
+    shown = [k for k, value in enumerate(found.values) if is_upper(value)]
     told = [dict(zip(kinds, map(float, sums[:, k]), strict=True)) for k in shown]
     return tuple(numbered([_of_wake(replace(mode, shares=own)) for mode, own in zip(modes, told, strict=True)]))
 
