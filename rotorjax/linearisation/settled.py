@@ -21,7 +21,7 @@ from rotorjax.ode.anderson import anderson
 from rotorjax.ode.orbit import make_orbit
 from rotorjax.ode.outcome import relative_rms
 from rotorjax.ode.runge_kutta import RK4
-from rotorjax.ode.trajectory import integrate
+from rotorjax.ode.trajectory import integrate, march
 
 TOL = 1e-7
 """Relative rms by which the state may miss itself after a passage."""
@@ -44,15 +44,11 @@ class Passage(eqx.Module):
 
     steps: int = eqx.field(static=True)
 
-    def path(self, x: SteadyState, u: Drive, p: Coupled) -> SteadyState:
-        """All states on the way (steps + 1, …)."""
-        dt = 2 * np.pi / p.rotor.blades / self.steps
-        return integrate(rates, x, 0.0, dt, self.steps, u, p, tableau=RK4).x
-
     def __call__(self, x: SteadyState, u: Drive, p: Coupled) -> SteadyState:
-        """The last of them."""
-        path = self.path(x, u, p)
-        return mirrored(jax.tree.map(lambda v: v[-1], path), p.rotor.blades)
+        """March and turn."""
+        dt = 2 * np.pi / p.rotor.blades / self.steps
+        end = integrate(rates, x, 0.0, dt, self.steps, u, p, save_every=self.steps, tableau=RK4).last
+        return mirrored(end, p.rotor.blades)
 
 
 def settled(base: Base, steps: int, progress: Callable[[str, float], None] | None = None) -> Base:
@@ -67,11 +63,19 @@ def settled(base: Base, steps: int, progress: Callable[[str, float], None] | Non
             progress("periodic flight", last["size"])
         return last["size"]
 
-    passage = Passage(steps)
     found = anderson(
-        passage, base.orbit.start, base.u, base.p, window=12, mixing=1.0, tol=TOL, max_iterations=MOST, measure=measure
+        Passage(steps),
+        base.orbit.start,
+        base.u,
+        base.p,
+        window=12,
+        mixing=1.0,
+        tol=TOL,
+        max_iterations=MOST,
+        measure=measure,
     )
     why = found.why if found.converged else f"no periodic flight of the march is found near the trim: {found.why}"
-    states = eqx.filter_jit(Passage.path)(passage, found.x, base.u, base.p)
-    states = jax.tree.map(lambda v: v[:-1], states)
+    dt = 2 * np.pi / base.p.rotor.blades / steps  # step by step, by the program that marches the inputs' steps too
+    path = march(rates, found.x, 0.0, dt, steps, base.u, base.p, progress=False, tableau=RK4)
+    states = jax.tree.map(lambda v: v[:steps], path.x)
     return base._replace(orbit=make_orbit(0.0, states, base.orbit.period, replace(found, why=why)))

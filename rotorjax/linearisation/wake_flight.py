@@ -19,6 +19,7 @@ from rotorjax.linearisation import condensed, drive, readings, rotor, steps
 from rotorjax.linearisation.condensed import Condensed, shares_of
 from rotorjax.linearisation.found import flight_notes
 from rotorjax.linearisation.instant import instant
+from rotorjax.linearisation.memory import give_back
 from rotorjax.linearisation.modes import FAMILIES, Mode, blade_modes, called, family_of, is_upper, named, numbered
 from rotorjax.linearisation.rotor import Base
 from rotorjax.linearisation.settled import settled
@@ -93,6 +94,8 @@ def all_states(
     for k, psi in enumerate(base.orbit.t):
         x = jax.tree.map(lambda leaf, k=k: leaf[k], base.orbit.x)
         one = instant(psi, x, base.u, base.p, inputs, outputs)
+        if k == 0:
+            give_back()  # what compiling took, before the matrices fill
         a[k] = one.a
         found.append(one._replace(a=a[k]))  # one copy of what takes most of the memory
         if progress is not None:
@@ -144,6 +147,11 @@ def linear_in_flight(
     base: of `base_in_flight`. near: as in `condense`. done(stage) is called after each. Raises InputError as
     `all_states` does.
     """
+    outs, blades = readings.expanded(outputs, stations(base.p).size), base.p.rotor.blades
+    # by the linear march's own method and steps: of the bound filter, fast against a step, it keeps 0.29 for 0.26; and
+    # first, for what its compiling takes is gone before the matrices are there
+    marched = steps.marched(base, inputs, outs, blades * (base.orbit.nodes // 2), 1, RK4)
+    done("marches")
     model = all_states(base, inputs, outputs, progress)
     done("linearisation")
     (small, basis), unit = condense(model, base, near)
@@ -152,14 +160,10 @@ def linear_in_flight(
     lead = leading(model.halved(), COUNT)
     done("leading modes")
     sizes = np.array([steps.size_of(name) for name in inputs])
-    outs = model.part.outputs
-    # by the linear march's own method and steps: of the bound filter, fast against a step, it keeps 0.29 for 0.26
-    marched = steps.marched(base, inputs, outs, base.p.rotor.blades * model.steps, 1, RK4)
-    done("marches")
     thrust = float(model.part.y[:, outs.index("CT")].mean()) if "CT" in outs else float("nan")
     return small, InWake(
         model.part.order,
-        model.part.t.size * base.p.rotor.blades,
+        model.part.t.size * blades,
         wake_modes(lead, model.part.states),
         float(lead.residuals.max()),
         steps.largest_gap(marched, unit * sizes),

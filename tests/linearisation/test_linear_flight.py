@@ -1,10 +1,12 @@
 """The rotor in its free wake in flight: put together against forward mode, against the march, against dense ones."""
 
+import ctypes
+import resource
+import sys
 from dataclasses import replace
-from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -15,22 +17,27 @@ from wakes import COARSE
 from rotorjax.coupled import RotorState
 from rotorjax.coupled_wake import coupled_wake
 from rotorjax.errors import InputError
-from rotorjax.linearisation import flight, schedule, wake_flight
+from rotorjax.linearisation import flight, kept, schedule, wake_flight
 from rotorjax.linearisation.condensed import aligned, condensed, shares_of
 from rotorjax.linearisation.drive import drive_of
 from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.hover import Flat, products
-from rotorjax.linearisation.instant import instant
+from rotorjax.linearisation.instant import MOTIONS, instant
+from rotorjax.linearisation.memory import give_back
 from rotorjax.linearisation.modes import Mode
-from rotorjax.linearisation.rotor import Base, SteadyState
-from rotorjax.linearisation.settled import Passage, mirrored, settled
+from rotorjax.linearisation.rotor import Base, SteadyState, rates
+from rotorjax.linearisation.settled import mirrored, settled
 from rotorjax.ode.harmonic import average
 from rotorjax.ode.orbit import make_orbit
 from rotorjax.ode.outcome import Outcome
 from rotorjax.ode.repeated import leading
+from rotorjax.ode.runge_kutta import RK4
+from rotorjax.ode.trajectory import march
 from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.simulation.march import marching
-from rotorjax.trim.run import request
+from rotorjax.trim.means import Means
+from rotorjax.trim.run import Result, request
+from rotorjax.trim.verdict import Verdict
 from rotorjax.wake.equilibrium import full_state, spread
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
@@ -71,24 +78,25 @@ def model(base):
 
 
 def test_matrices_are_those_of_forward_mode(base):
-    """At an azimuth of its own, along a random direction of all states and inputs."""
+    """At an azimuth of its own, along random directions of all states and inputs."""
     rng, psi, x = np.random.default_rng(0), base.orbit.t[0] + 0.3, base.orbit.start
     found = instant(psi, x, base.u, base.p, INPUTS, OUTPUTS)
     z = jnp.concatenate([ravel_pytree(x)[0], jnp.stack([base.u[name] for name in INPUTS])])
-    n, along = found.a.shape[0], rng.normal(size=(1, z.size))
-    truth = products(Flat(x, INPUTS, OUTPUTS), z, psi, base.u, base.p, along)[0]
-    v, w = along[0, :n], along[0, n:]
+    n, along = found.a.shape[0], rng.normal(size=(4 * MOTIONS + len(INPUTS), z.size))  # as many as it takes itself
+    truth = products(Flat(x, INPUTS, OUTPUTS), z, psi, base.u, base.p, along).T
+    v, w = along[:, :n].T, along[:, n:].T
     np.testing.assert_allclose(found.a @ v + found.b @ w, truth[:n], atol=1e-11 * np.abs(truth[:n]).max())
     np.testing.assert_allclose(found.c @ v + found.d @ w, truth[n:], atol=1e-11 * np.abs(truth[n:]).max())
 
 
 def test_steps_and_starts_march_as_the_nonlinear_equations_do(base, model):
     """Differences of marches over a passage, from a step of collective and from another start."""
-    path, size, rng = eqx.filter_jit(partial(Passage.path, Passage(base.orbit.nodes))), 1e-5, np.random.default_rng(1)
+    size, rng, nodes = 1e-5, np.random.default_rng(1), base.orbit.nodes
     flat, unravel = ravel_pytree(base.orbit.start)
 
     def end(x, u):
-        return np.asarray(ravel_pytree(mirrored(jax.tree.map(lambda v: v[-1], path(x, u, base.p)), 4))[0])
+        path = march(rates, x, 0.0, np.pi / 2 / nodes, nodes, u, base.p, progress=False, tableau=RK4)
+        return np.asarray(ravel_pytree(mirrored(path.last, 4))[0])
 
     rest = end(base.orbit.start, base.u)
     np.testing.assert_allclose(rest, flat, atol=1e-5)
@@ -186,6 +194,58 @@ def test_several_flights_make_one_scheduled_model(one, other):
         poles, own = (np.sort(np.linalg.eigvals(a).real) for a in (data["A"][k].values, found.full.a))
         np.testing.assert_allclose(poles, own, atol=1e-6)
     assert schedule.alike([replace(flights[0], wake=None)])[0] is flights[0].full
+
+
+def test_a_flight_in_the_wake_is_kept_and_taken_up(one, tmp_path, monkeypatch):
+    """But for the trim, which is set up anew with Pitt and Peters' inflow, and what is made of a flight in seconds."""
+    asked = replace(request("uh60", 0.00575, "freewake", advance=0.1), wake=wake_settings(**TINY | THICK))
+    trimmed = SimpleNamespace(z=np.arange(3.0), iterations=7, outcome=Outcome(None, 1e-7, (), 7, True, "made up", 0.0))
+    means = Means(0.00575, 4e-4, 2e-4, 1e-4, 0.0, 0.0, *np.arange(12.0).reshape(4, 3))
+    result = Result(asked, trimmed, means, Verdict("converged", "made up", 1e-4, 1e-3, 0.25), 1.5)
+    step, condensation = np.random.default_rng(0).normal(size=(2, *one.model.d.shape[1:]))
+    mode = Mode("wake collective", -0.2 + 1j, {"flap": 0.1, "inflow": 0.9}, {"wake[0]": 0.5})
+    wake = wake_flight.InWake(304, 48, (mode,), 1e-5, step, condensation, np.nan, one.basis)
+    parts, nothing = (one.model, (0,), None, None, step, wake), (None, None)
+    shelf, heard = kept.Shelf(tmp_path, Wanted(INPUTS, OUTPUTS), []), {}
+    assert shelf.take_up(asked) is None
+    shelf.keep(flight.LinearFlight(result, *nothing, (replace(mode, name="coning"), mode), {"trim": 2.0}, *parts))
+    monkeypatch.setattr(kept, "restored", lambda *of: heard.update(restored=of) or trimmed)
+    monkeypatch.setattr(kept, "completed", lambda *of: of)
+    again, dear, _, clock = shelf.take_up(asked)
+    _, state, outcome, damping = heard["restored"]
+    np.testing.assert_array_equal(state["00"], trimmed.z)
+    assert (outcome.residual, outcome.iterations, damping, clock.seconds) == (1e-7, 7, 0.25, {"trim": 2.0})
+    assert again.verdict == result.verdict
+    assert [found.name for found in dear.modes] == ["coning", "wake collective"]
+    assert dear.wake.modes == (mode,)
+    pairs = [(getattr(dear.periodic, name), getattr(one.model, name)) for name in "tabcdxuy"]
+    pairs += [(getattr(dear.wake, name), getattr(wake, name)) for name in ("basis", "step_error", "condensed_error")]
+    pairs += [(dear.wake.thrust, wake.thrust), (again.means.flap, means.flap), (dear.step_error, step)]
+    for found, before in pairs:
+        np.testing.assert_array_equal(found, before)
+    with pytest.raises(InputError, match=r"holds one with wake\.tip_core"):
+        shelf.take_up(replace(asked, wake=wake_settings(**TINY | THICK | {"tip_core": 0.11})))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is counted by Linux, and given back by GNU's C library")
+def test_memory_that_is_free_is_given_back():
+    """A hundred megabytes in small pieces, freed but for the last, which holds them back."""
+
+    def resident():
+        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+    library, size, count = ctypes.CDLL(None), 50_000, 2000
+    library.malloc.restype, library.free.argtypes = ctypes.c_void_p, [ctypes.c_void_p]
+    pieces = [library.malloc(ctypes.c_size_t(size)) for _ in range(count)]
+    for piece in pieces:
+        ctypes.memset(piece, 1, size)
+    for piece in pieces[:-1]:
+        library.free(piece)
+    before = resident()
+    give_back()
+    if hasattr(library, "malloc_trim"):
+        assert before - resident() > 0.8 * size * count
+    library.free(pieces[-1])
 
 
 BAD = {
