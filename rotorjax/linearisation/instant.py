@@ -53,11 +53,12 @@ def instant(
     along = np.zeros((moved.size, z.size))
     along[np.arange(moved.size), moved] = 1.0
     y, rows = (np.asarray(part) for part in pulled(function, z, psi, u, p))
+    wakes = np.asarray(by_wake(psi, x, u, p))  # first, for it takes the room of several of the whole
     whole = np.zeros((n, z.size))
     whole[:, moved] = products(function, z, psi, u, p, along)[:, :n].T
     wake, rates = members[:, MOTIONS:], members[:, [1, 3]]  # a blade's flap, its rate, lag and its rate come first
     into = np.concatenate([rates, wake], axis=1).ravel()
-    whole[np.ix_(into, wake.ravel())] = np.asarray(by_wake(psi, x, u, p)).reshape(into.size, wake.size)
+    whole[np.ix_(into, wake.ravel())] = wakes.reshape(into.size, wake.size)
     return Instant(whole[:, :n], whole[:, n:].copy(), rows[:, :n], rows[:, n:], y)  # a view would keep all of it
 
 

@@ -90,7 +90,7 @@ def blade_modes(found: Exponents, states: tuple[str, ...]) -> dict[int, tuple[st
         if family_of(state) != "inflow":
             groups.setdefault((family_of(state), _coordinate_of(state)), []).append(row)
     upper = np.array([k for k, value in enumerate(found.values) if is_upper(value)])
-    shares = {group: found.participation[np.ix_(rows, upper)].sum(axis=0) for group, rows in groups.items()}
+    shares = {group: found.participation[rows][:, upper].sum(axis=0) for group, rows in groups.items()}
     frequencies, values = np.imag(found.values[upper]), found.values
     fits = {group: _fits(group, shares, frequencies) for group in groups}
     left = {group: len(rows) for group, rows in groups.items()}

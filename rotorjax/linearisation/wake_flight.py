@@ -18,7 +18,7 @@ from rotorjax.coupled_wake import CoupledWake
 from rotorjax.linearisation import condensed, drive, readings, rotor, steps
 from rotorjax.linearisation.condensed import Condensed, shares_of
 from rotorjax.linearisation.found import flight_notes
-from rotorjax.linearisation.instant import instant
+from rotorjax.linearisation.instant import Instant, instant
 from rotorjax.linearisation.memory import give_back
 from rotorjax.linearisation.modes import FAMILIES, Mode, blade_modes, called, family_of, is_upper, named, numbered
 from rotorjax.linearisation.rotor import Base
@@ -93,11 +93,9 @@ def all_states(
     a, found = np.empty((base.orbit.nodes, len(names), len(names))), []
     for k, psi in enumerate(base.orbit.t):
         x = jax.tree.map(lambda leaf, k=k: leaf[k], base.orbit.x)
-        one = instant(psi, x, base.u, base.p, inputs, outputs)
+        found.append(_put(a[k], instant(psi, x, base.u, base.p, inputs, outputs)))
         if k == 0:
             give_back()  # what compiling took, before the matrices fill
-        a[k] = one.a
-        found.append(one._replace(a=a[k]))  # one copy of what takes most of the memory
         if progress is not None:
             progress(f"linearisation {(k + 1) / base.orbit.nodes:.0%}", 0.0)
     outs = readings.expanded(outputs, stations(base.p).size)
@@ -120,6 +118,12 @@ def all_states(
         notes=rotor.notes(base),
     )
     return condensed.repeated(part)
+
+
+def _put(place: Float[np.ndarray, "n n"], one: Instant) -> Instant:
+    """The instant with its A at a place of its own: one copy of what takes most of the memory."""
+    place[:] = one.a
+    return one._replace(a=place)
 
 
 def condense(
