@@ -51,7 +51,7 @@ def trim(
 
 
 def linearise(
-    about: "Solved | Result",
+    about: "Solved | SolvedTogether | Result",
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
     harmonics: Sequence[int] | None = (0,),
@@ -59,13 +59,15 @@ def linearise(
     time: "Time" = "azimuth",
 ) -> "LinearModel | PeriodicModel":
     """Linearise the equations that are marched, about a trim with an inflow model, a trim in the free wake (in flight
-    condensed to a hundred states beside the blades', in hover all that the inputs reach) or a rigid rotor's wake.
+    condensed to a hundred states beside the blades', in hover all that the inputs reach), a rigid rotor's wake, or
+    several rotors solved together (for two revolutions, in as few states as tell: `linearisation.several`).
 
     inputs, outputs: names (`linearisation.drive`, `.readings` have them), None for all. harmonics: those that the
     time-invariant model keeps, (0,) for the mean; None for the model that is periodic in azimuth. order: states of a
     reduced model of a trim, which keeps those of the blades; in the hovering free wake, which grows, it is for one
-    revolution. time: "azimuth" (rad, rotor units) or "seconds" (SI). Raises InputError where it has not converged, a
-    name is unknown, the order too low or there are harmonics of what has none, and for the finite-state model alone.
+    revolution; of several rotors. time: "azimuth" (rad, rotor units) or "seconds" (SI). Raises InputError where it has
+    not converged, a name is unknown, the order too low or there are harmonics of what has none, and for the
+    finite-state model alone.
 
     >>> import rotorjax as rj
     >>> hover = rj.trim(*rj.rotor("uh60"), 0.00575, inflow="uniform", azimuths=8)
@@ -84,6 +86,10 @@ def linearise(
             "Argument `about` must be a trim without surfaces, but has some: step it by rj.march, or linearise the "
             "wake of rigid blades among them (rj.solve of rj.free_wake)"
         )
+    if isinstance(about, SolvedTogether):
+        first = about.found.model.one(0)
+        model = _of_several(about, inputs, outputs, harmonics, order)
+        return handed_over(model, first.rotor, first.operating, time)
     if isinstance(about, Result) and not isinstance(about.trimmed, Trimmed) and not about.request.advance:
         model = _hovering(about, inputs, outputs, harmonics, order)
         return handed_over(model, about.request.rotor, about.request.operating, time)
@@ -111,8 +117,8 @@ def _periodic(
         return linear_wake(about.found, inputs, outputs), about.found.model
     if not isinstance(about, Result):
         raise InputError(
-            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, of one rotor, but is "
-            "neither"
+            "Argument `about` must be a trim (rj.trim) or a free wake of rigid blades in hover, of one rotor or "
+            "several, but is neither"
         )
     if isinstance(about.trimmed, Trimmed):
         return linear_rotor(base_of(about.trimmed), inputs, outputs), about.request
@@ -129,12 +135,28 @@ def _hovering(
     """Of a hover in the free wake. Raises InputError for harmonics that it has not."""
     from rotorjax.linearisation.hover_flight import hover_in_wake
 
-    if harmonics is None or tuple(harmonics) != (0,):
-        raise InputError(
-            "Argument `harmonics` must be (0,) for a hover in the free wake, which does not change with the azimuth, "
-            f"but is {harmonics}"
-        )
+    _check_mean(harmonics, "a hover in the free wake, which does not change with the azimuth")
     return hover_in_wake(about, inputs, outputs, order)
+
+
+def _of_several(
+    about: SolvedTogether,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+    harmonics: Sequence[int] | None,
+    order: int | None,
+) -> "LinearModel":
+    """Of several rotors. Raises InputError for harmonics that it has not."""
+    from rotorjax.linearisation.several import linear_several
+
+    _check_mean(harmonics, "several rotors, of which the mean over a blade's passage is found")
+    return linear_several(about.found, inputs, outputs, order)
+
+
+def _check_mean(harmonics: Sequence[int] | None, of: str) -> None:
+    """Raise InputError where more than the mean is asked of what has no more."""
+    if harmonics is None or tuple(harmonics) != (0,):
+        raise InputError(f"Argument `harmonics` must be (0,) for {of}, but is {harmonics}")
 
 
 def simulate(case: str | Path, progress: Callable[[str], None] | None = None) -> "Simulated":

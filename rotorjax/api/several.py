@@ -32,6 +32,7 @@ class SolvedTogether:
     rotors = property(lambda self: self.found.rotors, doc="Each rotor's own readings, in its own frame.")
     converged = property(lambda self: self.found.converged, doc="Whether this is the steady state that was asked for.")
     why = property(lambda self: self.found.why, doc="How the search ended, in words.")
+    clearance = property(lambda self: self.found.clearance, doc="Height over R of the lowest node above the ground.")
     leak = property(lambda self: self.found.leak, doc="Share that goes through surfaces between panels' middles.")
 
     def velocity(self, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:

@@ -199,8 +199,7 @@ def _(model: SeveralWakes, start: "SolvedTogether | None" = None, **settings: An
 
 def _warn_of(found: "Solution | SeveralSolution") -> None:
     """Warn where surfaces leak and where a wake lies under the ground."""
-    under = submerged(found) if isinstance(found, Solution) and found.converged else None
-    for words in (told(found.leak), under):
+    for words in (told(found.leak), submerged(found) if found.converged else None):
         if words is not None:
             warnings.warn(words, stacklevel=4)
 

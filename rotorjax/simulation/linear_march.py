@@ -8,6 +8,7 @@ a step is exp(dt M) where M is constant, and where it is periodic the exponentia
 Gauss' two nodes (Blanes, Casas, Oteo & Ros 2009, doi:10.1016/j.physrep.2008.11.001).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, make_dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -28,8 +29,9 @@ SPEED = "omega_rad_s"
 
 @dataclass(frozen=True)
 class LinearState:
-    """Where a march stands. x (n,): deviation from the trim. y: outputs by name, the trim's included, at the start of
-    the step that led here, NaN before the first. steps: made so far.
+    """Where a march stands. x (n,): deviation from the trim. y: outputs by name, those with numbers (`CT[0]`) as an
+    array (`y.CT`), the trim's included, at the start of the step that led here, NaN before the first. steps: made so
+    far.
     """
 
     x: Float[np.ndarray, " n"]
@@ -39,8 +41,8 @@ class LinearState:
 
 @dataclass(frozen=True)
 class LinearMarch:
-    """A linear model in steps. start: the trim. inputs: the trim's, by name, to be changed by `dataclasses.replace`.
-    seconds: that a step stands for.
+    """A linear model in steps. start: the trim. inputs: the trim's, by name, those with numbers as an array, to be
+    changed by `dataclasses.replace`. seconds: that a step stands for.
     """
 
     start: LinearState
@@ -64,7 +66,7 @@ class LinearMarch:
                 f"Argument `controls` must be made of this march's inputs, dataclasses.replace(march.inputs, "
                 f"{self._model.inputs[0]}=...), but is {type(controls).__name__}"
             )
-        u = np.array([float(value) for value in vars(controls).values()]) - self._model.u
+        u = _ordered(self._model.inputs, vars(controls)) - self._model.u
         z, k = np.concatenate([state.x, u]), state.steps % len(self._moved)
         x = self._moved[k] @ z
         if not np.all(np.isfinite(x)):
@@ -87,8 +89,8 @@ def linear_march(model: LinearModel | PeriodicModel, steps_per_turn: int | None 
         )
     seconds = 2 * np.pi / float(model.notes[SPEED]) / steps
     dt = seconds if model.time == "seconds" else 2 * np.pi / steps
-    start = dict(zip(model.inputs, model.u.tolist(), strict=True))
-    inputs = make_dataclass("Inputs", [(name, float) for name in model.inputs], frozen=True)(**start)
+    start = _by_name(model.inputs, model.u)
+    inputs = make_dataclass("Inputs", [(name, Any) for name in start], frozen=True)(**start)
     count = steps if isinstance(model, PeriodicModel) else 1
     return LinearMarch(
         start=LinearState(np.zeros(model.order), _named(model, np.full(len(model.outputs), np.nan)), 0),
@@ -103,7 +105,32 @@ def linear_march(model: LinearModel | PeriodicModel, steps_per_turn: int | None 
 
 
 def _named(model: LinearModel | PeriodicModel, y: Float[np.ndarray, " q"]) -> SimpleNamespace:
-    return SimpleNamespace(**dict(zip(model.outputs, y.tolist(), strict=True)))
+    return SimpleNamespace(**_by_name(model.outputs, y))
+
+
+def _by_name(names: Sequence[str], values: np.ndarray) -> dict[str, float | np.ndarray]:
+    """Numbers by name; those of one name with numbers in brackets as an array, in the order in which they come."""
+    places = _places(names)
+    return {name: values[at] if names[at[0]] != name else float(values[at[0]]) for name, at in places.items()}
+
+
+def _ordered(names: Sequence[str], found: dict[str, Any]) -> Float[np.ndarray, " m"]:
+    """The numbers that `_by_name` was given. Raises InputError where there are more or fewer."""
+    values = np.empty(len(names))
+    for name, at in _places(names).items():
+        given = np.ravel(np.asarray(found[name], float))
+        if given.size != len(at):
+            raise InputError(f"Argument `controls` must hold {len(at)} of `{name}`, but holds {given.size}")
+        values[at] = given
+    return values
+
+
+def _places(names: Sequence[str]) -> dict[str, list[int]]:
+    """Where the numbers of each name stand, its brackets left out."""
+    found: dict[str, list[int]] = {}
+    for i, name in enumerate(names):
+        found.setdefault(name.partition("[")[0], []).append(i)
+    return found
 
 
 def _beside(of_state: np.ndarray, of_input: np.ndarray) -> np.ndarray:

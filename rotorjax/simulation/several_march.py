@@ -43,9 +43,9 @@ def several_march(
     """
     if not solution.converged:
         raise InputError(f"Argument `solution` must be converged to be marched from, but: {solution.why}")
-    several = _marching(solution.model)
+    several = marching(solution.model)
     needed = steps_of_ages(several.wakes.settings)
-    steps = _steps(steps_per_turn, twelfths(needed))
+    steps = steps_of(several, steps_per_turn)
     angle = 2 * np.pi / steps
     with precision_of(precision):
         start, inputs, p = on_device(
@@ -65,15 +65,22 @@ def several_march(
 
 def advanced(state: Marched, dt: Array, inputs: SeveralInputs, several: SeveralWakes) -> Marched:
     """One step of dt (rad at the nominal speed) with inputs held over it."""
-    still = jax.tree.map(lambda _: 0.0, state.x)
-    lag = several.wakes.settings.circulation_lag
-    decay = replace(still, wakes=replace(still.wakes, gamma_bound=1 / jnp.ravel(lag)[0]))
-    x, y = exponential.told_step(rhs, jnp.zeros_like(dt), state.x, dt, decay, inputs, several)
+    x, y = stepped(state.x, dt, inputs, several)
     x = replace(x, azimuth=jnp.mod(x.azimuth, 2 * np.pi))
     return MarchState(x, y, state.steps + 1, all_finite(x))
 
 
-def _marching(several: SeveralWakes) -> SeveralWakes:
+def stepped(
+    x: SeveralState, dt: Array, inputs: SeveralInputs, several: SeveralWakes
+) -> tuple[SeveralState, Performance]:
+    """The state a step later, azimuths counted on, and the outputs at its start."""
+    still = jax.tree.map(lambda _: 0.0, x)
+    lag = several.wakes.settings.circulation_lag
+    decay = replace(still, wakes=replace(still.wakes, gamma_bound=1 / jnp.ravel(lag)[0]))
+    return exponential.told_step(rhs, jnp.zeros_like(dt), x, dt, decay, inputs, several)
+
+
+def marching(several: SeveralWakes) -> SeveralWakes:
     """The rotors on the solutions of their lifting lines, their pairs summed by matrix products."""
     wakes = [several.one(i) for i in range(len(several))]
     each = [replace(one.settings, bound_filter="solution", pair_sums="products") for one in wakes]
@@ -81,7 +88,9 @@ def _marching(several: SeveralWakes) -> SeveralWakes:
     return replace(several, wakes=replace(several.wakes, settings=settings))
 
 
-def _steps(wanted: int | None, least: int) -> int:
+def steps_of(several: SeveralWakes, wanted: int | None = None) -> int:
+    """Steps of a revolution, what the wakes need where none are wanted. Raises InputError where they are too few."""
+    least = twelfths(steps_of_ages(several.wakes.settings))
     if wanted is None:
         return max(24, least)
     if check_whole("steps_per_turn", wanted, 1, 100_000) < least:

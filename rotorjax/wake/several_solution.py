@@ -25,7 +25,7 @@ from rotorjax.wake.performance import Performance
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.search import MOST_SLICES, Progress
 from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
-from rotorjax.wake.solution import Solution, readings, solve
+from rotorjax.wake.solution import Solution, lowest_node, readings, solve, told_of
 
 Number = Numbers = Any
 
@@ -69,6 +69,14 @@ class SeveralSolution:
     def figure_of_merit(self) -> Number:
         """Ideal power of the rotors, each on its own disk, over what they take: Σ C_T^1.5/√2 / Σ C_P."""
         return np.sum(self.CT**1.5) / np.sqrt(2) / np.sum(self.CP)
+
+    @property
+    def clearance(self) -> float:
+        """Height over R of the lowest node of all wakes above the ground; inf without ground."""
+        if self.model.ground is None:
+            return float("inf")
+        each = zip(self.rotors, np.asarray(self.model.phases), strict=True)
+        return min(float(lowest_node(one.state, one.model, phase)) for one, phase in each)
 
     @property
     def leak(self) -> float | None:
@@ -233,15 +241,15 @@ def _looked(x: Together, several: SeveralWakes) -> tuple[Together, Evaluation, A
 def _read(several: SeveralWakes, outcome: Outcome, iterations: int) -> SeveralSolution:
     """Evaluate what a search ended with, and collect what a user wants of it."""
     several = jax.tree.map(jnp.asarray, with_collectives(several, jnp.asarray(outcome.x.collective)))
-    moved, found, loads = _looked(outcome.x, several)
+    moved, evaluated, loads = _looked(outcome.x, several)
     rotors = []
     for i in range(len(several)):
-        wakes, evaluation = jax.tree.map(lambda a, i=i: a[i], (outcome.x.wakes, found))
+        wakes, evaluation = jax.tree.map(lambda a, i=i: a[i], (outcome.x.wakes, evaluated))
         one = readings(several.one(i), wakes, evaluation)
         rotors.append(replace(one, converged=outcome.converged, why=outcome.why))
-    return SeveralSolution(
+    found = SeveralSolution(
         model=several,
-        state=found.state,
+        state=evaluated.state,
         rotors=tuple(rotors),
         converged=outcome.converged,
         why=outcome.why,
@@ -252,3 +260,4 @@ def _read(several: SeveralWakes, outcome: Outcome, iterations: int) -> SeveralSo
         CP_induced=np.asarray(loads.induced),
         mean_inflow=np.asarray(loads.mean_inflow),
     )
+    return replace(found, why=told_of(found, found.why)) if found.converged else found

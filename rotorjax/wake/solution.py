@@ -6,13 +6,13 @@ a solved case it moves height and slope from there to here (search.py).
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from rotorjax.frames import disk_points, rotate_about_shaft
 from rotorjax.rotor.blade_element import disk_loading
@@ -172,7 +172,7 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
         found,
         **numbers,
         converged=search.ok,
-        why=f"{search.why}, but {under}" if search.ok and (under := submerged(found)) else search.why,
+        why=told_of(found, search.why) if search.ok else search.why,
         residual=displacement(change),
         load_change=abs(float(then) / numbers["CT"] - 1),
         iterations=search.iterations,
@@ -182,7 +182,21 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
     )
 
 
-def submerged(found: Solution) -> str | None:
+class OverGround(Protocol):
+    """What has nodes over ground, or none under it."""
+
+    @property
+    def clearance(self) -> float:
+        """Height over R of the lowest node."""
+        ...
+
+
+def told_of(found: OverGround, why: str) -> str:
+    """Why a search ended where it converged, and what to know of what it found."""
+    return why if (under := submerged(found)) is None else f"{why}, but {under}"
+
+
+def submerged(found: OverGround) -> str | None:
     """What to know of a wake that lies under the ground, in one line; None of one that does not."""
     if found.clearance >= 0:
         return None
@@ -245,9 +259,9 @@ def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "...
 
 
 @eqx.filter_jit
-def lowest_node(state: WakeState, model: FreeWake) -> Float[Array, ""]:
-    """Least distance of the wake's nodes from the plane, negative under it."""
-    psi = azimuths(state)[:, None]  # each slice's nodes are in its own blade's frame
+def lowest_node(state: WakeState, model: FreeWake, phase: ArrayLike = 0.0) -> Float[Array, ""]:
+    """Least distance of the wake's nodes from the plane, negative under it. phase: azimuth of slice 0."""
+    psi = phase + azimuths(state)[:, None]  # each slice's nodes are in its own blade's frame
     nodes = jnp.concatenate([v.reshape(len(psi), -1, 3) for v in (state.near, state.far)], axis=1)
     assert model.ground is not None
     return jnp.min(model.ground.distance(rotate_about_shaft(nodes, psi)))

@@ -1,5 +1,7 @@
 """Several rotors in one free wake: symmetries, limits, one solved coaxial pair and its derivative."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,6 +14,7 @@ from rotorjax.errors import InputError
 from rotorjax.wake import field
 from rotorjax.wake.equilibrium import full_state, spread
 from rotorjax.wake.several import answer, evaluate, interference, leaked, several_wakes, velocity
+from rotorjax.wake.solution import told_of
 
 SETTINGS = rj.WakeSettings(**COARSE)
 THRUST = 0.006
@@ -126,6 +129,19 @@ def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial,
 
 
 @pytest.mark.slow
+def test_nodes_under_the_ground_are_told_of_all_rotors(uh60, coaxial):
+    """The lower rotor's, which stands 0.2 R lower; in free air there are none."""
+    assert coaxial.clearance == np.inf
+    lowest = float(min(jnp.min(v[..., 2]) for v in (coaxial.found.state.near[1], coaxial.found.state.far[1])))
+    for height, under in ((0.15 - lowest, True), (0.25 - lowest, False)):
+        model = several_wakes(*uh60, [(0, 0, 0), (0, 0, -0.2)], ground=rj.plane(height), settings=SETTINGS)
+        rotors = tuple(replace(one, model=model.one(i)) for i, one in enumerate(coaxial.rotors))
+        found = replace(coaxial.found, model=model, rotors=rotors)
+        np.testing.assert_allclose(found.clearance, -0.05 if under else 0.05, atol=1e-12)
+        words = "found, but its lowest node is 0.05 R under the ground"
+        assert told_of(found, "found")[: len(words)] == (words if under else "found")
+
+
 def test_what_is_found_is_drawn_and_written(coaxial, tmp_path):
     coaxial.plot(tmp_path / "pair.png")
     coaxial.to_vtk(tmp_path / "pair.vtk")
