@@ -261,7 +261,7 @@ def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "...
 @eqx.filter_jit
 def lowest_node(state: WakeState, model: FreeWake, phase: ArrayLike = 0.0) -> Float[Array, ""]:
     """Least distance of the wake's nodes from the plane, negative under it. phase: azimuth of slice 0."""
-    psi = phase + azimuths(state)[:, None]  # each slice's nodes are in its own blade's frame
+    psi = jnp.asarray(phase + azimuths(state))[:, None]  # each slice's nodes are in its own blade's frame
     nodes = jnp.concatenate([v.reshape(len(psi), -1, 3) for v in (state.near, state.far)], axis=1)
     assert model.ground is not None
     return jnp.min(model.ground.distance(rotate_about_shaft(nodes, psi)))
