@@ -20,7 +20,7 @@ from rotorjax.simulation.several_march import marching, stepped
 from rotorjax.wake.several_dynamics import SeveralInputs, nominal
 from rotorjax.wake.several_solution import SeveralSolution
 
-SETTINGS = rj.WakeSettings(**COARSE)
+SETTINGS = rj.WakeSettings(**COARSE | {"closure_turns": 0, "closure_bundles": 0})
 STEP = 2 * np.pi / 24
 march_step = eqx.filter_jit(stepped)
 

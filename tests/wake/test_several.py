@@ -130,11 +130,12 @@ def test_a_coaxial_pair_is_trimmed_and_takes_more_power_than_two_rotors(coaxial,
 
 @pytest.mark.slow
 def test_nodes_under_the_ground_are_told_of_all_rotors(uh60, coaxial):
-    """The lower rotor's, which stands 0.2 R lower; in free air there are none."""
+    """Whosever they are; in free air there are none."""
     assert coaxial.clearance == np.inf
-    lowest = float(min(jnp.min(v[..., 2]) for v in (coaxial.found.state.near[1], coaxial.found.state.far[1])))
-    for height, under in ((0.15 - lowest, True), (0.25 - lowest, False)):
-        model = several_wakes(*uh60, [(0, 0, 0), (0, 0, -0.2)], ground=rj.plane(height), settings=SETTINGS)
+    places, state = np.array([(0, 0, 0), (0, 0, -0.2)]), coaxial.found.state
+    lowest = min(float(jnp.min(v[i, ..., 2])) + places[i, 2] for v in (state.near, state.far) for i in range(2))
+    for height, under in ((-0.05 - lowest, True), (0.05 - lowest, False)):
+        model = several_wakes(*uh60, places, ground=rj.plane(height), settings=SETTINGS)
         rotors = tuple(replace(one, model=model.one(i)) for i, one in enumerate(coaxial.rotors))
         found = replace(coaxial.found, model=model, rotors=rotors)
         np.testing.assert_allclose(found.clearance, -0.05 if under else 0.05, atol=1e-12)
