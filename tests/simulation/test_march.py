@@ -121,7 +121,7 @@ def test_what_is_of_one_rotor_without_surfaces_says_so(level):
         InputError, match=r"a trim of one rotor \(rj.trim\), several .* or a linear model, but is a Plane"
     ):
         rj.march(plane(1.0))  # pyright: ignore[reportCallIssue, reportArgumentType]
-    with pytest.raises(InputError, match="of one rotor, but is neither"):
+    with pytest.raises(InputError, match="of one rotor or several, but is neither"):
         rj.linearise(plane(1.0))  # pyright: ignore[reportArgumentType]
 
 
