@@ -16,13 +16,13 @@ from rotorjax.panels.surface import Panels
 
 Point = ArrayLike | Sequence[ArrayLike]
 
-_turned = jax.jit(rotate_about_shaft)
-
 PANEL = 0.25
 """Size over R of a panel near the shaft."""
 
 STRETCH = 2.0
 """Distance over R from the shaft up to which panels keep their size; beyond they grow with it."""
+
+_turned = jax.jit(rotate_about_shaft)
 
 
 def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
@@ -35,16 +35,15 @@ def box(low: Point, high: Point, panel: float = PANEL) -> Panels:
     >>> len(hangar), round(float(hangar.areas.sum()), 3)
     (52, 20.0)
     """
-    ends = _corner("low", low), _corner("high", high)
-    ends = (
-        tuple(map(np.asarray, ends)) if known(ends) else ends
-    )  # numpy's where numbers are known: no program to compile
-    low, high = ends
-    if known(low, high) and not np.all(high - low > 0):
-        raise refuse("high", f"lie beyond low = {low.tolist()} on all axes", shown(high.tolist()))
+    low, high = _corner("low", low), _corner("high", high)
+    xp: Any = jnp
+    if known(low, high):  # by numpy: no programs to compile
+        xp, low, high = np, np.asarray(low), np.asarray(high)
+        if not np.all(high - low > 0):
+            raise refuse("high", f"lie beyond low = {low.tolist()} on all axes", shown(high.tolist()))
     lines = [_divided(low[i], high[i], panel, even=i == 2) for i in range(3)]
-    faces = [_face(lines, axis, upper) for axis in range(3) for upper in (False, True)]
-    return Panels(array(_numpy_of(lines).concatenate(faces)))
+    faces = [_face(lines, axis, upper, xp) for axis in range(3) for upper in (False, True)]
+    return Panels(array(xp.concatenate(faces)))
 
 
 def slab(low: Point, high: Point, top: ArrayLike, thickness: ArrayLike = 0.5, panel: float = PANEL) -> Panels:
@@ -106,7 +105,7 @@ def _corner(name: str, value: Point, count: int = 3) -> Array:
     return found
 
 
-def _divided(low: Array, high: Array, panel: float, *, even: bool) -> Float[Array, " N"]:
+def _divided(low: Any, high: Any, panel: float, *, even: bool) -> Float[Array, " N"]:
     """Places from low to high a panel's size apart, wider far from the shaft unless `even`; their share of the way is
     fixed by numbers, so that they move with low and high.
     """
@@ -123,10 +122,9 @@ def _divided(low: Array, high: Array, panel: float, *, even: bool) -> Float[Arra
     return low + share * (high - low)
 
 
-def _face(lines: list[Array], axis: int, upper: bool) -> Float[Array, "P 4 3"]:
-    """Panels of the lower or upper face of a box along an axis, counter-clockwise from outside."""
+def _face(lines: list[Any], axis: int, upper: bool, xp: Any) -> Float[Array, "P 4 3"]:
+    """Panels of the lower or upper face of a box along an axis, counter-clockwise from outside; xp: numpy or jax's."""
     first, second = (axis + 1) % 3, (axis + 2) % 3
-    xp = _numpy_of(lines)
     one, other = xp.meshgrid(lines[first], lines[second], indexing="ij")
     parts: dict[int, Array] = {
         first: one,
@@ -135,11 +133,6 @@ def _face(lines: list[Array], axis: int, upper: bool) -> Float[Array, "P 4 3"]:
     }
     a, b, c, d = (v.reshape(-1, 3) for v in _cells(xp.stack([parts[i] for i in range(3)], axis=-1)))
     return xp.stack([a, b, c, d] if upper else [a, d, c, b], axis=1)
-
-
-def _numpy_of(lines: list[Array]) -> Any:
-    """numpy, or jax's where a line is jax's."""
-    return jnp if any(isinstance(line, jax.Array) for line in lines) else np
 
 
 def _cells(nodes: Float[Array, "X Y 3"]) -> tuple[Array, Array, Array, Array]:

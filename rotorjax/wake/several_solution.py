@@ -245,7 +245,7 @@ def _read(several: SeveralWakes, outcome: Outcome, iterations: int) -> SeveralSo
     rotors = []
     for i in range(len(several)):
         wakes, evaluation = jax.tree.map(lambda a, i=i: a[i], (outcome.x.wakes, evaluated))
-        one = readings(several.one(i), wakes, evaluation)
+        one = readings(several.one(i), wakes, evaluation, several.phases[i])
         rotors.append(replace(one, converged=outcome.converged, why=outcome.why))
     found = SeveralSolution(
         model=several,

@@ -162,7 +162,7 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
     model = jax.tree.map(jnp.asarray, model)  # a search reckons with numpy's, which do not go into a traced function
     change, evaluation = look(model, x)
     moved = jax.tree.map(lambda a, b: np.asarray(a) + np.asarray(b), x, change)
-    then = _read_off(model, look(model, moved)[1])["CT"]
+    then = _read_off(model, look(model, moved)[1], jnp.asarray(0.0))["CT"]
     found = readings(model, x, evaluation)
     numbers: dict[str, Any] = {n: np.asarray(getattr(found, n)) for n in ARRAYS} | {
         n: float(getattr(found, n)) for n in NUMBERS
@@ -206,13 +206,13 @@ def submerged(found: OverGround) -> str | None:
     )
 
 
-def readings(model: FreeWake, x: Unknowns, found: Evaluation | None = None) -> Solution:
+def readings(model: FreeWake, x: Unknowns, found: Evaluation | None = None, phase: ArrayLike = 0.0) -> Solution:
     """What can be read off a converged periodic wake, as functions of model and wake: for jax to differentiate.
 
-    found: the wake's evaluation, where it is at hand.
+    found: the wake's evaluation, where it is at hand. phase: azimuth of slice 0, which a ground that leans knows.
     """
     found = evaluated(model, x) if found is None else found
-    read: dict[str, Any] = _read_off(model, found)
+    read: dict[str, Any] = _read_off(model, found, jnp.asarray(phase))
     return Solution(
         model=model,
         state=found.state,
@@ -238,10 +238,10 @@ def tip_vortices(found: Solution, blades: int) -> Float[np.ndarray, "B A 3"]:
 
 
 @eqx.filter_jit
-def _read_off(model: FreeWake, found: Evaluation) -> dict[str, Float[Array, "..."]]:
+def _read_off(model: FreeWake, found: Evaluation, phase: Float[Array, ""]) -> dict[str, Float[Array, "..."]]:
     """Fields of a solution: along blades and vortices, and of the whole rotor."""
     psi, now = azimuths(found.state), performance(model, found)
-    tip = jnp.concatenate([found.start.points[:, :1], above_ground(model, found.state).far[:, 0]], axis=1)
+    tip = jnp.concatenate([found.start.points[:, :1], above_ground(model, found.state, phase).far[:, 0]], axis=1)
     return {
         "r": model.stations,
         "widths": model.widths,

@@ -41,7 +41,10 @@ def sunk(request, uh60, coarse):
 
 def test_the_wake_is_that_of_the_mirror_images(sunk):
     model, low, high, _ = sunk
-    np.testing.assert_allclose(eqx.filter_jit(above_ground)(model, low).far, high.far, atol=1e-14)
+    lift = eqx.filter_jit(above_ground)
+    np.testing.assert_allclose(lift(model, low).far, high.far, atol=1e-14)
+    turned = lift(model, replace(low, far=rotate_about_shaft(low.far, jnp.asarray(-0.7))), 0.7).far
+    np.testing.assert_allclose(rotate_about_shaft(turned, jnp.asarray(0.7)), high.far, atol=1e-14)
     points = jnp.asarray([[0.3, 0.2, -0.2], [-0.9, 0.1, 0.1]])
     at = eqx.filter_jit(field.velocity)
     np.testing.assert_allclose(at(low, points, model), at(high, points, model), atol=1e-13)
