@@ -87,6 +87,16 @@ def test_files_import_in_no_circle():
     list(TopologicalSorter(imports()).static_order())
 
 
+def test_a_class_has_a_name_of_its_own():
+    """One of each thing, and no name for two."""
+    found = {}
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(module_of(path))
+    assert {name: modules for name, modules in found.items() if len(modules) > 1} == {}
+
+
 def test_no_transform_of_xla():
     # it may wait for ever on a CPU: rotorjax/ode/fourier.py
     found = [path.name for path in PACKAGE.rglob("*.py") if "jnp.fft" in path.read_text(encoding="utf-8")]

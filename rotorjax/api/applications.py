@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rotorjax.simulation.run import Simulated
     from rotorjax.sweep.case import SweepCase
     from rotorjax.trim.run import Request, Result
-    from rotorjax.wake.performance import Performance
+    from rotorjax.wake.performance import Coefficients
     from rotorjax.wake.several_dynamics import SeveralInputs, SeveralState
 
 Progress = Callable[[str, float], None]
@@ -200,7 +200,7 @@ def march(
 @overload
 def march(
     about: SolvedTogether, steps_per_turn: int | None = None, **options: Any
-) -> "March[SeveralState, Performance, SeveralInputs]": ...
+) -> "March[SeveralState, Coefficients, SeveralInputs]": ...
 @overload
 def march(about: "LinearModel | PeriodicModel", steps_per_turn: int | None = None) -> "LinearMarch": ...
 def march(

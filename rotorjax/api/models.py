@@ -20,7 +20,7 @@ from rotorjax.rotor.geometry import Rotor
 SIZES = ("ground_harmonics", "ground_radial_terms")
 
 
-class FiniteState(eqx.Module):
+class FiniteStateRotor(eqx.Module):
     """A rotor whose blades see the finite-state inflow of their own loads. flow: the model, over ground or none."""
 
     rotor: Rotor
@@ -76,7 +76,7 @@ def finite_state(
     harmonics: int = 1,
     surfaces: Panels | None = None,
     **settings,
-) -> FiniteState:
+) -> FiniteStateRotor:
     """Make the finite-state model (VPBFSM) of a rotor, in or out of ground effect, beside and above solid surfaces.
 
     harmonics: highest harmonic of loading and ground sources, which a slope needs. surfaces: as in `free_wake`; ground
@@ -92,4 +92,6 @@ def finite_state(
     if surfaces is not None:
         check_still(operating)
     sizes: dict[str, Any] = dict(zip(SIZES, (harmonics, 7) if surfaces is None else IN_SHADOW, strict=True))
-    return FiniteState(rotor, operating, finite_state_model(ground, harmonics, surfaces=surfaces, **sizes | settings))
+    return FiniteStateRotor(
+        rotor, operating, finite_state_model(ground, harmonics, surfaces=surfaces, **sizes | settings)
+    )

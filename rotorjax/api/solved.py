@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.api.models import FiniteState
+from rotorjax.api.models import FiniteStateRotor
 from rotorjax.bench.mean_flow import mean_velocity
 from rotorjax.checks import known
 from rotorjax.errors import InputError
@@ -51,7 +51,7 @@ class Solved(eqx.Module):
     too: C_T = T/(ρA(ΩR)²), C_P = P/(ρA(ΩR)³), inflow over ΩR, positive down, at azimuths psi (rad) and radii r/R.
     """
 
-    model: FreeWake | FiniteState
+    model: FreeWake | FiniteStateRotor
     found: Solution | Balance
 
     CT = property(lambda self: self.found.CT, doc="Thrust coefficient.")
@@ -147,11 +147,11 @@ NUMBERS = {
     "CP_profile": "profile part of the power coefficient",
     "mean_inflow": "area-weighted mean inflow over ΩR, positive down",
 }
-NAMES = {FreeWake: "free wake", FiniteState: "finite state"}
+NAMES = {FreeWake: "free wake", FiniteStateRotor: "finite state"}
 
 
 @singledispatch
-def solve(model: FreeWake | FiniteState, start: Solved | None = None, **settings: Any) -> Solved:
+def solve(model: FreeWake | FiniteStateRotor, start: Solved | None = None, **settings: Any) -> Solved:
     """Find the steady inflow of a rotor and what it does in it; of several rotors (`rj.several_wakes`) too.
 
     start: a solved neighbour that a free wake's search begins from. settings: of a free wake's search (`tol`,
@@ -183,7 +183,7 @@ def _(model: FreeWake, start: Solved | None = None, **settings: Any) -> Solved:
 
 
 @solve.register
-def _(model: FiniteState, start: Solved | None = None) -> Solved:
+def _(model: FiniteStateRotor, start: Solved | None = None) -> Solved:
     return Solved(model, balance(model.flow, model.rotor, model.operating, model.stations))
 
 
@@ -212,7 +212,7 @@ def velocity(solved: Solved, points: Float[Array, "N 3"], instants: int = 12) ->
     points = jnp.asarray(points, float)
     if isinstance(solved.found, Solution):
         return mean_velocity(solved.found, points, instants)
-    assert isinstance(solved.model, FiniteState)
+    assert isinstance(solved.model, FiniteStateRotor)
     return potential.velocity(solved.found.state, points, solved.model.flow)
 
 
@@ -242,7 +242,7 @@ def _about(text: str, unit: str = "1") -> dict[str, str]:
     return {"units": unit, "long_name": text}
 
 
-def _place(model: FreeWake | FiniteState) -> dict[str, tuple[float, str, str]]:
+def _place(model: FreeWake | FiniteStateRotor) -> dict[str, tuple[float, str, str]]:
     """Where a rotor stands, and how."""
     ground: Plane | None = model.ground
     height, slope = (np.nan, 0.0) if ground is None else (float(ground.height), float(ground.slope))

@@ -24,7 +24,7 @@ STEP_LEFT = 1e-5  # of a parameter's range
 UNDETERMINED = 1e-9  # smallest over largest singular value of the scaled Jacobian
 
 
-class Verdict(NamedTuple):
+class FitQuality(NamedTuple):
     """What the Jacobian says at the end of a fit.
 
     rms: √(Σr²/N). left (): the largest Gauss–Newton step left, over the range of its parameter. rank (): smallest over
@@ -44,7 +44,7 @@ class Verdict(NamedTuple):
 class Fit:
     """The end of a fit, converged or not.
 
-    values (P,): of `parameters`, in order. rms, covariance: see `Verdict`. history: rms after every step, the start
+    values (P,): of `parameters`, in order. rms, covariance: see `FitQuality`. history: rms after every step, the start
     included. converged, why: the verdict and one sentence. at_bound: names of parameters held by a bound. wall_time_s:
     of the whole fit; compile_time_s: what of it went before the first evaluation was done.
     """
@@ -140,7 +140,7 @@ def calibrate_many(
 
 def _descend(
     descent: Descent, start: Float[np.ndarray, " P"], method: Method, steps: int | None
-) -> tuple[np.ndarray, Verdict]:
+) -> tuple[np.ndarray, FitQuality]:
     """Where a driver ends, in the unbounded coordinates, and the verdict on it."""
     z = descent.parameters.unbounded(start)
     _check(descent, z)
@@ -165,10 +165,10 @@ def even_starts(parameters: ParameterSet, count: int) -> np.ndarray:
     return parameters.lower + (parameters.upper - parameters.lower) * (0.05 + 0.9 * share)
 
 
-def judge(parameters: ParameterSet, r: Float[np.ndarray, " N"], jacobian: Float[np.ndarray, "N P"]) -> Verdict:
+def judge(parameters: ParameterSet, r: Float[np.ndarray, " N"], jacobian: Float[np.ndarray, "N P"]) -> FitQuality:
     """Read the verdict off the residual and its Jacobian with respect to the values."""
     if not np.all(np.isfinite(r)) or not np.all(np.isfinite(jacobian)):
-        return Verdict(np.nan, np.nan, np.nan, np.full((len(parameters), len(parameters)), np.nan))
+        return FitQuality(np.nan, np.nan, np.nan, np.full((len(parameters), len(parameters)), np.nan))
     width = parameters.upper - parameters.lower
     u, s, vt = np.linalg.svd(jacobian * width, full_matrices=False)
     rank = float(s[-1] / s[0]) if s[0] else 0.0
@@ -177,10 +177,10 @@ def judge(parameters: ParameterSet, r: Float[np.ndarray, " N"], jacobian: Float[
     spare = r.size - len(parameters)
     variance = r @ r / spare if spare else np.nan
     covariance = variance * (vt.T * inverse**2) @ vt * np.outer(width, width)
-    return Verdict(float(np.sqrt(np.mean(r * r))), float(np.max(np.abs(step))), rank, covariance)
+    return FitQuality(float(np.sqrt(np.mean(r * r))), float(np.max(np.abs(step))), rank, covariance)
 
 
-def conclude(parameters: ParameterSet, values: Float[np.ndarray, " P"], verdict: Verdict) -> tuple[bool, str]:
+def conclude(parameters: ParameterSet, values: Float[np.ndarray, " P"], verdict: FitQuality) -> tuple[bool, str]:
     """Whether a fit converged, and why in one sentence."""
     if not np.isfinite(verdict.rms):
         return False, "the residual is not finite at the end"

@@ -61,7 +61,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     from rotorjax.commands.arguments import introduce_flights
     from rotorjax.io.atomic import make_folder
     from rotorjax.linearisation import flight, identify, schedule, trim_output
-    from rotorjax.linearisation.kept import Shelf
+    from rotorjax.linearisation.kept import FlightShelf
     from rotorjax.trim.run import Result
 
     usual = {"collective": None} if chosen.inflow == "freewake" else {"quick": False, "collective": None}
@@ -73,7 +73,7 @@ def _trimmed(chosen: argparse.Namespace) -> int:
     introduce_flights(requests)
     lost, known, small = [], [], []
     with _progress_bar() as progress:
-        shelf = Shelf(out, wanted, lambda line: print(line, file=sys.stderr)) if len(requests) > 1 else None
+        shelf = FlightShelf(out, wanted, lambda line: print(line, file=sys.stderr)) if len(requests) > 1 else None
         for one in schedule.flights(requests, wanted, progress, shelf):
             if isinstance(one, Result):
                 lost.append(one)
@@ -155,10 +155,11 @@ def _wake(chosen: argparse.Namespace) -> int:
     """Models of a rigid rotor's free wake in hover."""
     from rotorjax.bench.settings import study_settings
     from rotorjax.bench.single import check_case
+    from rotorjax.bench.wake_file import model_of
     from rotorjax.commands.arguments import case_of, introduce, names_of
     from rotorjax.io.atomic import make_folder, write_json
     from rotorjax.linearisation import output
-    from rotorjax.linearisation.run import Linearised, check, linearise_case, model_of
+    from rotorjax.linearisation.run import Linearised, check, linearise_case
     from rotorjax.wake.settings import MARCHED
 
     _only_the_wake(chosen)

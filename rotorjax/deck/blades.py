@@ -12,31 +12,19 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.inflow import balance
+from rotorjax.inflow.balance import Stations
 from rotorjax.operating import OperatingPoint
-from rotorjax.potential.field import disk_functions
 from rotorjax.potential.loading import from_distribution
 from rotorjax.potential.modes import ModeTable
 from rotorjax.rotor.blade_element import disk_loading, section_loads
 from rotorjax.rotor.geometry import Rotor
 
 
-class Stations(balance.Stations):
-    """Where loads are taken: Gauss nodes and weights along the blades, with what the march needs of them."""
-
-    def functions(self, modes: ModeTable) -> Float[Array, "M KR"]:
-        """Return the inflow of unit states at the stations."""
-        return disk_functions(modes, *self.xy).reshape(len(modes), -1)
-
-    def pressure(self, modes: ModeTable) -> Float[Array, "M KR"]:
-        """Return the matrix from dC_T/dr̄ at the stations to τ (Eq. 2)."""
-        unit = jnp.eye(self.psi.size * self.r.size).reshape(-1, self.psi.size, self.r.size)
-        rows = eqx.filter_vmap(lambda load: from_distribution(load, self.r, self.widths, self.psi, modes))(unit)
-        return rows.T
-
-
 def stations(root: float, radii: int = 12, azimuths: int = 8) -> Stations:
-    """Make stations between root (over R) and tip. Raises InputError where root is not in [0, 1) or a count below 1."""
+    """Make stations at Gauss nodes between root (over R) and tip.
+
+    Raises InputError where root is not in [0, 1) or a count below 1.
+    """
     if not 0 <= root < 1:
         raise InputError(f"Argument `root` must lie in [0, 1) (over R), but is {root}")
     if radii < 1 or azimuths < 1:
@@ -46,6 +34,12 @@ def stations(root: float, radii: int = 12, azimuths: int = 8) -> Stations:
     return Stations(
         jnp.asarray(r), jnp.asarray(weight * (1 - root) / 2), 2 * jnp.pi / azimuths * jnp.arange(azimuths, dtype=float)
     )
+
+
+def pressure_matrix(at: Stations, modes: ModeTable) -> Float[Array, "M KR"]:
+    """Return the matrix from dC_T/dr̄ at the stations to τ (Eq. 2)."""
+    unit = jnp.eye(at.psi.size * at.r.size).reshape(-1, at.psi.size, at.r.size)
+    return eqx.filter_vmap(lambda load: from_distribution(load, at.r, at.widths, at.psi, modes))(unit).T
 
 
 class Blades(eqx.Module):

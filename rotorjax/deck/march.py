@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from rotorjax.deck.over_ground import Controls, Output, OverGround, RotorState, output, rhs
+from rotorjax.deck.over_ground import DeckControls, DiskState, Output, OverGround, output, rhs
 from rotorjax.errors import InputError
 from rotorjax.potential.moving_ground import require_increasing
 
@@ -20,13 +20,13 @@ class History(NamedTuple):
     """States and outputs at the instants psi (T,)."""
 
     psi: Float[Array, " T"]
-    states: RotorState
+    states: DiskState
     outputs: Output
 
 
 @eqx.filter_jit
 def simulate(
-    model: OverGround, start: RotorState, psi: Float[Array, " T"], inputs: Controls, save_every: int = 1
+    model: OverGround, start: DiskState, psi: Float[Array, " T"], inputs: DeckControls, save_every: int = 1
 ) -> History:
     """March from psi[0] with inputs linear between the instants, one midpoint step (second order) an interval.
 
@@ -42,13 +42,13 @@ def simulate(
         raise InputError(f"Argument `save_every` must divide the {psi.size - 1} intervals, but is {save_every}")
     require_increasing("psi", psi)
 
-    def step(state: RotorState, row: tuple[Array, Controls, Controls]) -> tuple[RotorState, None]:
+    def step(state: DiskState, row: tuple[Array, DeckControls, DeckControls]) -> tuple[DiskState, None]:
         h, first, last = row
         middle = jax.tree.map(lambda p, q: (p + q) / 2, first, last)
         half = _moved(state, rhs(h, state, first, model), h / 2)
         return _moved(state, rhs(h, half, middle, model), h), None
 
-    def stretch(state: RotorState, rows: tuple) -> tuple[RotorState, RotorState]:
+    def stretch(state: DiskState, rows: tuple) -> tuple[DiskState, DiskState]:
         state = jax.lax.scan(step, state, rows)[0]
         return state, state
 
@@ -61,5 +61,5 @@ def simulate(
     return History(instants, states, outputs)
 
 
-def _moved(state: RotorState, rate: RotorState, h: Array) -> RotorState:
+def _moved(state: DiskState, rate: DiskState, h: Array) -> DiskState:
     return jax.tree.map(lambda x, x_dot: x + h * x_dot, state, rate)

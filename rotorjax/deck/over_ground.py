@@ -18,11 +18,12 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Float
 
-from rotorjax.deck.blades import Blades, Stations, stations
+from rotorjax.deck.blades import Blades, pressure_matrix, stations
 from rotorjax.deck.tip_path import TipPath, blades_at
 from rotorjax.errors import InputError
+from rotorjax.inflow.balance import Stations
 from rotorjax.potential.contraction import NODES
-from rotorjax.potential.dynamics import RotorInputs, mass_flow, rate_table
+from rotorjax.potential.dynamics import InflowInputs, mass_flow, rate_table
 from rotorjax.potential.field import disk_functions
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.ground_table import GroundTable, disk_modes
@@ -57,8 +58,8 @@ def disk_matrices(rotor: FiniteStateModel, at: Stations) -> DiskMatrices:
     inflow = rotor_flow(rotor, None, *at.xy).reshape(len(rotor.modes), -1)
     return DiskMatrices(
         inflow,
-        at.functions(modes),
-        at.pressure(rotor.modes),
+        disk_functions(modes, *at.xy).reshape(len(modes), -1),
+        pressure_matrix(at, rotor.modes),
         harmonics @ rotor_flow(rotor, None, x, y).T,
         harmonics @ disk_functions(modes, x, y).T,
     )
@@ -80,7 +81,7 @@ class OverGround(eqx.Module):
     disk: DiskMatrices
 
 
-class Controls(eqx.Module):
+class DeckControls(eqx.Module):
     """Inputs at one instant, or over T instants with a leading axis T on every field.
 
     ground: the plane's motion. edge (): of a half-plane, over R (ignored elsewhere). collective (): rad. mu, climb ():
@@ -97,7 +98,7 @@ class Controls(eqx.Module):
     tau: Float[Array, "*T M"]
 
 
-class RotorState(eqx.Module):
+class DiskState(eqx.Module):
     """States. a (M,): rotor, over ΩR. wake (K, M): what the wake carries below the disk; K = 0 without transit time.
     flap, flap_rate (F,): β₀, β₁c, β₁s (rad) and their rates; F = 3, or 0 for rigid blades.
     """
@@ -167,7 +168,7 @@ def controls(
     edge: Float[Array, "*T"] | float = 0.0,
     tau: Float[Array, "*T M"] | None = None,
     climb_rate: Float[Array, "*T"] | float = 0.0,
-) -> Controls:
+) -> DeckControls:
     """Make controls, numbers held over the motion's instants."""
     shape = ground.height.shape
 
@@ -175,10 +176,10 @@ def controls(
         return jnp.broadcast_to(jnp.asarray(value, float), shape)
 
     tau = jnp.broadcast_to(0.0 if tau is None else tau, (*shape, len(model.modes)))
-    return Controls(ground, held(edge), held(collective), held(mu), held(climb), held(climb_rate), tau)
+    return DeckControls(ground, held(edge), held(collective), held(mu), held(climb), held(climb_rate), tau)
 
 
-def ground_flow(state: RotorState, now: Controls, model: OverGround) -> Float[Array, " L"]:
+def ground_flow(state: DiskState, now: DeckControls, model: OverGround) -> Float[Array, " L"]:
     """Return the coefficients of the ground's upward flow on the disk."""
     w = jnp.zeros(2)
     if model.variant != "static":
@@ -190,7 +191,7 @@ def ground_flow(state: RotorState, now: Controls, model: OverGround) -> Float[Ar
 
 
 def _loads(
-    state: RotorState, ground: Float[Array, " L"], now: Controls, model: OverGround
+    state: DiskState, ground: Float[Array, " L"], now: DeckControls, model: OverGround
 ) -> tuple[Float[Array, " M"], Float[Array, " F"]]:
     """τ, and the acceleration of the flapping."""
     if model.blades is None:
@@ -209,27 +210,27 @@ def _loads(
     return tau, tip_path.acceleration(state.flap, state.flap_rate, loads, now.climb_rate, at)
 
 
-def rhs(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGround) -> RotorState:
+def rhs(t: Float[Array, ""], state: DiskState, now: DeckControls, model: OverGround) -> DiskState:
     """Return d(state)/dψ; t does not enter."""
     del t
     ground = ground_flow(state, now, model)
     tau, flap = _loads(state, ground, now, model)
-    inputs = RotorInputs(tau, now.mu, now.climb)
+    inputs = InflowInputs(tau, now.mu, now.climb)
     v = mass_flow(state.a, _induced(state, ground, model), inputs, model.rotor)
     a = jnp.asarray(rate_table(model.rotor.modes), state.a.dtype) @ (tau - v * state.a)
     speed, transport = v[model.rotor.modes.index(0, 1)], model.transport
     wake = state.wake if transport is None else transport.rate(state.a, state.wake, speed)
-    return RotorState(a, wake, state.flap_rate, flap)
+    return DiskState(a, wake, state.flap_rate, flap)
 
 
-def _induced(state: RotorState, ground: Float[Array, " L"], model: OverGround) -> Float[Array, ""]:
+def _induced(state: DiskState, ground: Float[Array, " L"], model: OverGround) -> Float[Array, ""]:
     """The mean flow through the disk that the mass flow is taken from."""
     if not model.rotor.ground_in_mass_flow:
         return rotor_means(model.rotor, None) @ state.a
     return model.disk.rotor_harmonics[0] @ state.a - model.disk.ground_harmonics[0] @ ground
 
 
-def output(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGround) -> Output:
+def output(t: Float[Array, ""], state: DiskState, now: DeckControls, model: OverGround) -> Output:
     """Return what the rotor does in a state; t does not enter."""
     del t
     ground = ground_flow(state, now, model)
@@ -241,7 +242,7 @@ def output(t: Float[Array, ""], state: RotorState, now: Controls, model: OverGro
 
 
 @eqx.filter_jit
-def trim(model: OverGround, now: Controls, guess: Float[Array, " M"] | None = None) -> RotorState:
+def trim(model: OverGround, now: DeckControls, guess: Float[Array, " M"] | None = None) -> DiskState:
     """Return the state that stays where it is under constant controls, wake and flapping settled; Newton's method.
 
     guess: a, by default that of C_T = 0.005. Raises an error at run time where Newton's method does not converge.
@@ -252,10 +253,10 @@ def trim(model: OverGround, now: Controls, guess: Float[Array, " M"] | None = No
     if model.tip_path is not None:
         guess = jnp.concatenate([guess, jnp.zeros(3)])
 
-    def settled(x: Array) -> RotorState:
+    def settled(x: Array) -> DiskState:
         a, flap = x[:count], x[count:]
         wake = jnp.zeros((0, count)) if model.transport is None else model.transport.settled(a)
-        return RotorState(a, wake, flap, jnp.zeros_like(flap))
+        return DiskState(a, wake, flap, jnp.zeros_like(flap))
 
     def residual(x: Array, _: None) -> Array:
         rate = rhs(jnp.zeros(()), settled(x), now, model)

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from rotorjax.deck.blades import SectionBlades, stations
 from rotorjax.deck.case import DeckCase
 from rotorjax.deck.march import History, simulate
-from rotorjax.deck.over_ground import Controls, Output, OverGround, RotorState, controls, output, over_ground, trim
+from rotorjax.deck.over_ground import DeckControls, DiskState, Output, OverGround, controls, output, over_ground, trim
 from rotorjax.deck.tip_path import tip_path
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
@@ -54,7 +54,7 @@ def rotor_model(case: DeckCase) -> FiniteStateModel:
     )
 
 
-def build(case: DeckCase, variant: Variant | None = None) -> tuple[OverGround, Float[np.ndarray, " T"], Controls]:
+def build(case: DeckCase, variant: Variant | None = None) -> tuple[OverGround, Float[np.ndarray, " T"], DeckControls]:
     """Tabulate the ground over the case's heights, slopes and edges; return model, instants (rad) and controls."""
     variant = case.variant if variant is None else variant
     rotor, psi = rotor_model(case), case.instants()
@@ -118,7 +118,7 @@ def run_case(case: DeckCase) -> tuple[xr.Dataset, dict[str, float]]:
     return data, figures
 
 
-def _trimmed(model: OverGround, first: Controls, case: DeckCase) -> RotorState:
+def _trimmed(model: OverGround, first: DeckControls, case: DeckCase) -> DiskState:
     still = eqx.tree_at(lambda c: (c.ground.height_rate, c.ground.slope_rate), first, (jnp.zeros(()),) * 2)
     try:
         state = trim(model, _without_climb(still))
@@ -130,11 +130,11 @@ def _trimmed(model: OverGround, first: Controls, case: DeckCase) -> RotorState:
     return state
 
 
-def _without_climb(now: Controls) -> Controls:
+def _without_climb(now: DeckControls) -> DeckControls:
     return eqx.tree_at(lambda c: (c.climb, c.climb_rate), now, (jnp.zeros_like(now.climb),) * 2)
 
 
-def _static(case: DeckCase, model: OverGround, kept: Controls, start: RotorState) -> Output:
+def _static(case: DeckCase, model: OverGround, kept: DeckControls, start: DiskState) -> Output:
     """What the rotor does in the steady state of each instant's geometry; start: the one at the first."""
     if model.transport is None:  # the same table
         still = over_ground(model.rotor, model.table, model.blades, "static", None, model.at, model.tip_path)
@@ -143,7 +143,7 @@ def _static(case: DeckCase, model: OverGround, kept: Controls, start: RotorState
 
     @jax.jit
     def march(guess: Array) -> tuple:
-        def one(a: Array, now: Controls) -> tuple[Array, Output]:
+        def one(a: Array, now: DeckControls) -> tuple[Array, Output]:
             state = trim(still, now, a)
             return state.a, output(jnp.zeros(()), state, now, still)
 
@@ -152,7 +152,7 @@ def _static(case: DeckCase, model: OverGround, kept: Controls, start: RotorState
     return march(start.a)[1]
 
 
-def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls, steady: Output) -> xr.Dataset:
+def _dataset(case: DeckCase, model: OverGround, history: History, kept: DeckControls, steady: Output) -> xr.Dataset:
     frames = np.unique(np.linspace(0, history.psi.size - 1, FRAMES).astype(int))
     x, y = GRID_R * np.cos(GRID_PSI)[:, None], GRID_R * np.sin(GRID_PSI)[:, None]
     rotor, out = model.rotor, history.outputs
@@ -179,7 +179,7 @@ def _dataset(case: DeckCase, model: OverGround, history: History, kept: Controls
     )
 
 
-def _series(kept: Controls, out: Output, steady: Output, flapping: bool) -> dict[str, tuple]:
+def _series(kept: DeckControls, out: Output, steady: Output, flapping: bool) -> dict[str, tuple]:
     """Variables of time: what was prescribed and what came of it, marched and steady at each instant."""
     now = ", steady at each instant"
     rows = [
@@ -202,11 +202,11 @@ def _series(kept: Controls, out: Output, steady: Output, flapping: bool) -> dict
     return {name: ("time", np.asarray(v), {"units": unit, "long_name": text}) for name, v, unit, text in rows}
 
 
-def _residuals(model: OverGround, history: History, kept: Controls, frames: np.ndarray) -> Float[Array, " F"]:
+def _residuals(model: OverGround, history: History, kept: DeckControls, frames: np.ndarray) -> Float[Array, " F"]:
     """What the untabulated sources leave on the deck, where some of it is under the disk."""
 
     @eqx.filter_jit
-    def one(state, now: Controls) -> Array:
+    def one(state, now: DeckControls) -> Array:
         rotor = model.rotor
         if rotor.region is not None:
             rotor = eqx.tree_at(lambda m: m.region.edge, rotor, now.edge)

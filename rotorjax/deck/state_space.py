@@ -1,9 +1,9 @@
 """A, B, C, D of a rotor over ground at a flight condition, through the package's lineariser.
 
 States: a[i], wake[k,i] and, where blades flap, flap[i] and flap_rate[i] (β₀, β₁c, β₁s). Inputs: collective, climb,
-climb_rate, mu, height, height_rate, slope, slope_rate, edge and tau[i], by their names in `Controls`. Outputs: those of
-`over_ground.Output`, uniform, cosine, sine and thrust by default. Time is azimuth (rad). Height and its rate are
-separate inputs, as climb and its rate are: at a frequency ω the plane's heave h e^{iωψ} enters as
+climb_rate, mu, height, height_rate, slope, slope_rate, edge and tau[i], by their names in `DeckControls`. Outputs:
+those of `over_ground.Output`, uniform, cosine, sine and thrust by default. Time is azimuth (rad). Height and its rate
+are separate inputs, as climb and its rate are: at a frequency ω the plane's heave h e^{iωψ} enters as
 h (B_height + iω B_rate) (`heave_response`).
 """
 
@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Complex, Float
 
-from rotorjax.deck.over_ground import Controls, OverGround, RotorState, output, rhs
+from rotorjax.deck.over_ground import DeckControls, DiskState, OverGround, output, rhs
 from rotorjax.errors import InputError
 from rotorjax.ode.linearise import linearise
 from rotorjax.ode.models import LinearModel
@@ -45,8 +45,8 @@ UNITS = {
 
 def state_space(
     model: OverGround,
-    state: RotorState,
-    now: Controls,
+    state: DiskState,
+    now: DeckControls,
     inputs: Sequence[str] = INPUTS,
     outputs: Sequence[str] = OUTPUTS,
     tolerance: float = 1e-8,

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from rotorjax.deck.blades import Stations
+from rotorjax.inflow.balance import Stations
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.flap_lag import Blade, accelerations, blade_of
 from rotorjax.rotor.geometry import Rotor

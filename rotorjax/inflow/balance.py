@@ -119,7 +119,7 @@ def balance(
     return _read(eqx.error_if(tau, ~found, words), flow, model, rotor, operating, stations)
 
 
-class Flow(eqx.Module):
+class StationFlow(eqx.Module):
     """unit: of a model. at (M, K, R): inflow of unit rotor states at the stations."""
 
     unit: UnitStates
@@ -127,14 +127,14 @@ class Flow(eqx.Module):
 
 
 @eqx.filter_jit
-def flow_of(model: FiniteStateModel, stations: Stations) -> Flow:
+def flow_of(model: FiniteStateModel, stations: Stations) -> StationFlow:
     """The costly part of a balance, which neither blades nor loads change."""
     unit = unit_states(model)
-    return Flow(unit, unit_inflow(model, unit, *stations.xy))
+    return StationFlow(unit, unit_inflow(model, unit, *stations.xy))
 
 
 def attempt(
-    flow: Flow,
+    flow: StationFlow,
     model: FiniteStateModel,
     rotor: Rotor,
     operating: OperatingPoint,
@@ -147,7 +147,7 @@ def attempt(
 
 
 @eqx.filter_jit
-def _search(flow: Flow, model, rotor, operating, stations: Stations, thrust):
+def _search(flow: StationFlow, model, rotor, operating, stations: Stations, thrust):
     """Pressure terms in balance, and whether they are and thrust as the first ones do."""
     start = jnp.zeros(len(model.modes), stations.r.dtype).at[model.modes.index(0, 1)].set(np.sqrt(3) / 4 * thrust)
     climb = operating.climb_ratio(rotor.radius)
@@ -160,7 +160,7 @@ def _search(flow: Flow, model, rotor, operating, stations: Stations, thrust):
 
 
 @eqx.filter_jit
-def _read(tau, flow: Flow, model, rotor, operating, stations: Stations) -> Balance:
+def _read(tau, flow: StationFlow, model, rotor, operating, stations: Stations) -> Balance:
     climb = operating.climb_ratio(rotor.radius)
     state = axial_state(model, tau, climb, flow.unit)
     induced = jnp.tensordot(state.a, flow.at, 1)

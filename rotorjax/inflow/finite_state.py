@@ -75,7 +75,7 @@ class FiniteStateInflow(InflowModel):
         def turned(wind: Array) -> Array:
             """Rate in a wind given by the cosine and sine of its direction, aft towards starboard, and its speed."""
             turn = _turn(self.model.modes, wind[0], wind[1])
-            given = dynamics.RotorInputs(turn @ tau, wind[2], inputs.climb)
+            given = dynamics.InflowInputs(turn @ tau, wind[2], inputs.climb)
             return turn.T @ dynamics.rotor_rate(turn @ state, given, over, upflow)
 
         along, across, none = jax.vmap(turned)(winds)

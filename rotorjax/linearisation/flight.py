@@ -13,9 +13,9 @@ from rotorjax.linearisation.compact import check_order, compact, frequencies, ga
 from rotorjax.linearisation.drive import check_names, drive_of, lasting
 from rotorjax.linearisation.found import LinearRotor, Wanted, flight_notes
 from rotorjax.linearisation.hover_flight import LinearHover, hovering
-from rotorjax.linearisation.modes import Mode, modes
+from rotorjax.linearisation.modes import RotorMode, modes
 from rotorjax.linearisation.stages import Stages
-from rotorjax.linearisation.wake_flight import InWake, all_modes, base_in_flight, linear_in_flight
+from rotorjax.linearisation.wake_flight import WakeFindings, all_modes, base_in_flight, linear_in_flight
 from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.hill import harmonic_transfer, present
 from rotorjax.ode.models import LinearModel, PeriodicModel
@@ -39,7 +39,7 @@ class LinearFlight(LinearRotor):
     full_gap_db: Float[np.ndarray, "q m"]
     full_gap_deg: Float[np.ndarray, "q m"]
     step_error: Float[np.ndarray, "q m"]
-    wake: InWake | None = None
+    wake: WakeFindings | None = None
 
     @property
     def models(self) -> dict[str, LinearModel | PeriodicModel]:
@@ -52,9 +52,9 @@ class Dear:
     """What takes long to find of a flight: `completed` makes the rest of it in seconds. Fields as in LinearFlight."""
 
     periodic: PeriodicModel
-    modes: tuple[Mode, ...]
+    modes: tuple[RotorMode, ...]
     step_error: Float[np.ndarray, "q m"]
-    wake: InWake | None = None
+    wake: WakeFindings | None = None
 
 
 def hovers_in_wake(request: Request) -> bool:

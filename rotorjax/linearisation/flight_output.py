@@ -11,7 +11,7 @@ from rotorjax.linearisation.compact import HIGHEST
 from rotorjax.linearisation.condensed import TURNS
 from rotorjax.linearisation.flight import LinearFlight
 from rotorjax.linearisation.told import by_name, mode_content, pairs, part_of, roots
-from rotorjax.linearisation.wake_flight import InWake
+from rotorjax.linearisation.wake_flight import WakeFindings
 
 
 def pictures(found: LinearFlight) -> dict[str, Figure]:
@@ -76,7 +76,7 @@ def report(found: LinearFlight) -> str:
     )
 
 
-def _wake_report(wake: InWake) -> str:
+def _wake_report(wake: WakeFindings) -> str:
     """What a reader should know of the model of all states."""
     rows = [
         (m.name, m.exponent.real, m.exponent.imag, ", ".join(f"{k} {v:.2f}" for k, v in m.shares.items()))

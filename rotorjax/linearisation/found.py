@@ -6,7 +6,7 @@ import numpy as np
 
 from rotorjax.linearisation import rotor
 from rotorjax.linearisation.compact import Compact
-from rotorjax.linearisation.modes import Mode
+from rotorjax.linearisation.modes import RotorMode
 from rotorjax.ode.models import LinearModel, PeriodicModel
 from rotorjax.trim.run import Result
 
@@ -41,7 +41,7 @@ class LinearRotor:
     result: Result
     full: LinearModel
     small: Compact
-    modes: tuple[Mode, ...]
+    modes: tuple[RotorMode, ...]
     seconds: dict[str, float]
 
     @property

@@ -9,7 +9,7 @@ from rotorjax.linearisation import rotor
 from rotorjax.linearisation.found import LinearRotor, Wanted, flight_notes
 from rotorjax.linearisation.hover import HoverModel, Wave, hover_model
 from rotorjax.linearisation.hover_small import SmallHover, small_hover
-from rotorjax.linearisation.modes import Mode, blade_modes, named, numbered
+from rotorjax.linearisation.modes import RotorMode, blade_modes, named, numbered
 from rotorjax.linearisation.stages import Stages
 from rotorjax.ode.hill import Exponents
 from rotorjax.ode.models import LinearModel
@@ -59,7 +59,7 @@ def hover_in_wake(
     return model.linear() if order is None else small_hover(model, order).model
 
 
-def hover_modes(model: HoverModel, leading: int = LEADING) -> tuple[tuple[Mode, ...], dict[str, int]]:
+def hover_modes(model: HoverModel, leading: int = LEADING) -> tuple[tuple[RotorMode, ...], dict[str, int]]:
     """Modes of the blades and the `leading` ones of the wake, the least damped first; unstable ones by coordinate."""
     found, unstable = [], {}
     for wave in model.waves:
@@ -73,7 +73,7 @@ def hover_modes(model: HoverModel, leading: int = LEADING) -> tuple[tuple[Mode, 
     return tuple(numbered(kept)), unstable
 
 
-def _of_wake(mode: Mode, wave: Wave) -> Mode:
+def _of_wake(mode: RotorMode, wave: Wave) -> RotorMode:
     """A mode of the wake by its wave number: what goes round as a whole, once … or from blade to blade."""
     kind = {"0": "collective", "D": "differential"}.get(wave.coordinates[0], f"cyclic {wave.coordinates[0][:-1]}")
     return replace(mode, name=f"{WAKE} {kind}") if mode.name.startswith("inflow") else mode

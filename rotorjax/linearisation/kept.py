@@ -15,9 +15,9 @@ from rotorjax.io import netcdf
 from rotorjax.io.atomic import json_text, make_folder
 from rotorjax.linearisation.flight import Dear, LinearFlight, completed
 from rotorjax.linearisation.found import Wanted
-from rotorjax.linearisation.modes import Mode
+from rotorjax.linearisation.modes import RotorMode
 from rotorjax.linearisation.stages import Stages
-from rotorjax.linearisation.wake_flight import InWake
+from rotorjax.linearisation.wake_flight import WakeFindings
 from rotorjax.ode.export import periodic_of, to_dataset
 from rotorjax.ode.outcome import Outcome
 from rotorjax.trim.means import Means
@@ -28,7 +28,7 @@ from rotorjax.wake.settings import flight_settings
 FILE = "flight.nc"
 STATE = "trim_"
 NUMBERS = ("states", "azimuths", "residual", "thrust")
-"""Of `InWake`, kept as they are."""
+"""Of `WakeFindings`, kept as they are."""
 
 
 def folder_of(request: Request) -> str:
@@ -59,7 +59,7 @@ def table_of(request: Request, wanted: Wanted) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Shelf:
+class FlightShelf:
     """The folder of a sweep, a folder for each flight in it. say: hears of a file that is set aside."""
 
     folder: Path
@@ -135,12 +135,12 @@ def _flight(data: xr.Dataset, request: Request, wanted: Wanted) -> LinearFlight:
     return completed(result, Dear(periodic, modes, data["step_error"].to_numpy(), _in_wake(data)), wanted, clock)
 
 
-def _in_wake(data: xr.Dataset) -> InWake | None:
+def _in_wake(data: xr.Dataset) -> WakeFindings | None:
     if "wake" not in data.attrs:
         return None
     told = json.loads(data.attrs["wake"])
     own: dict[str, Any] = {name: np.nan if told[name] is None else told[name] for name in NUMBERS}
-    return InWake(
+    return WakeFindings(
         **own,
         modes=tuple(map(_mode, told["modes"])),
         step_error=data["step_error"].to_numpy(),
@@ -149,9 +149,9 @@ def _in_wake(data: xr.Dataset) -> InWake | None:
     )
 
 
-def _plain(mode: Mode) -> dict[str, Any]:
+def _plain(mode: RotorMode) -> dict[str, Any]:
     return asdict(mode) | {"exponent": [mode.exponent.real, mode.exponent.imag]}
 
 
-def _mode(told: dict[str, Any]) -> Mode:
-    return Mode(told["name"], complex(*told["exponent"]), told["shares"], told["states"])
+def _mode(told: dict[str, Any]) -> RotorMode:
+    return RotorMode(told["name"], complex(*told["exponent"]), told["shares"], told["states"])

@@ -18,7 +18,7 @@ LEAST = 0.1
 
 
 @dataclass(frozen=True)
-class Mode:
+class RotorMode:
     """A mode, or a complex pair of them by the one of positive frequency. name: unique in its model. exponent: growth +
     i frequency per unit of time, as seen from the hub. shares: participation of the families. states: those of the
     leading ones.
@@ -35,14 +35,14 @@ class Mode:
         return -self.exponent.real / abs(self.exponent) if self.exponent else 0.0
 
 
-def modes(model: PeriodicModel) -> tuple[Mode, ...]:
+def modes(model: PeriodicModel) -> tuple[RotorMode, ...]:
     """All modes of a rotor's model, the least damped first."""
     return named(exponents(model), model.states)
 
 
 def named(
     found: Exponents, states: tuple[str, ...], known: Mapping[int, tuple[str, str]] | None = None
-) -> tuple[Mode, ...]:
+) -> tuple[RotorMode, ...]:
     """Name exponents by what takes part in them: a complex pair is one mode. known: what `called` says, by number of
     exponent, where the largest share is not to decide.
     """
@@ -57,7 +57,7 @@ def named(
         chosen.append((family, coordinate, value, shares, part))
     names = _names([(family, coordinate, value) for family, coordinate, value, _, _ in chosen])
     return tuple(
-        Mode(name, value, shares, {states[i]: float(part[i]) for i in np.argsort(-part) if part[i] > TELLING})
+        RotorMode(name, value, shares, {states[i]: float(part[i]) for i in np.argsort(-part) if part[i] > TELLING})
         for name, (_, _, value, shares, part) in zip(names, chosen, strict=True)
     )
 
@@ -68,7 +68,7 @@ def called(states: tuple[str, ...], part: Float[np.ndarray, " n"], family: str) 
     return family, states[int(np.argmax(own))] if family == "inflow" else _coordinate(states, own)
 
 
-def numbered(found: Sequence[Mode]) -> list[Mode]:
+def numbered(found: Sequence[RotorMode]) -> list[RotorMode]:
     """Modes with names that occur once each."""
     counts: dict[str, int] = {}
     told = []

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from rotorjax.bench.cases import Case
-from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
 from rotorjax.linearisation import figures
 from rotorjax.linearisation.assembly import assemble
@@ -21,7 +19,7 @@ from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.models import LinearModel, PeriodicModel
 from rotorjax.wake import solution
 from rotorjax.wake.clock import Clock
-from rotorjax.wake.model import FreeWake, free_wake
+from rotorjax.wake.model import FreeWake
 from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution
 
@@ -49,11 +47,6 @@ class Linearised:
     march_error: Float[np.ndarray, "q m"]
     seconds: dict[str, float]
     compile_time_s: float
-
-
-def model_of(case: Case, settings: StudySettings) -> FreeWake:
-    """The free wake of a case."""
-    return free_wake(settings.rotor, settings.operating, case.ground, settings.wake)
 
 
 def check(model: FreeWake, inputs: tuple[str, ...], outputs: tuple[str, ...], order: int, harmonics: int = 0) -> None:

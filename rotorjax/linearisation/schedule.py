@@ -18,7 +18,7 @@ from rotorjax.linearisation.flight import LinearFlight, linearise_trim
 from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.handover import Time, handed_over
 from rotorjax.linearisation.hover_flight import LinearHover
-from rotorjax.linearisation.kept import Shelf, above, folder_of
+from rotorjax.linearisation.kept import FlightShelf, above, folder_of
 from rotorjax.linearisation.told import roots
 from rotorjax.linearisation.trim_output import Found
 from rotorjax.ode.export import to_dataset
@@ -28,7 +28,7 @@ from rotorjax.trim.run import Progress, Request, Result
 
 
 def flights(
-    requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None, shelf: Shelf | None = None
+    requests: Sequence[Request], wanted: Wanted, progress: Progress | None = None, shelf: FlightShelf | None = None
 ) -> Iterator[Found | Result]:
     """Linearise one flight after another, each trimmed from the one before.
 

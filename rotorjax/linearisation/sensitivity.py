@@ -22,10 +22,10 @@ from rotorjax.linearisation.drive import Drive, drive_of
 from rotorjax.linearisation.rotor import SteadyState, rate_and_readings, signs, state_names
 from rotorjax.ode.implicit import attach
 from rotorjax.ode.orbit import make_orbit, require_converged
-from rotorjax.trim.problem import Flight, inputs_at, node_azimuths
+from rotorjax.trim.problem import SteadyFlight, inputs_at, node_azimuths
 from rotorjax.trim.solve import Trimmed
 
-Design = tuple[Flight, CoupledRotor]
+Design = tuple[SteadyFlight, CoupledRotor]
 
 
 class Matrices(NamedTuple):

@@ -22,7 +22,7 @@ from jaxtyping import Array, Float
 from rotorjax.checks import check_whole
 from rotorjax.errors import InputError
 from rotorjax.linearisation.drive import UNITS, check_double
-from rotorjax.linearisation.system import Base
+from rotorjax.linearisation.system import WakeBase
 from rotorjax.ode.labels import labels, select, units_of
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.reduction import even
@@ -165,7 +165,7 @@ def pulses(
 @eqx.filter_jit
 def about(several: SeveralWakes, state: WakeState, t: Float[Array, ""]) -> SeveralState:
     """The periodic wake of all blades at Ω t, from its slices."""
-    wakes = eqx.filter_vmap(lambda wake, model: Base(wake, model).at(t))(state, several.wakes)
+    wakes = eqx.filter_vmap(lambda wake, model: WakeBase(wake, model).at(t))(state, several.wakes)
     return SeveralState(several.phases + t, wakes)
 
 

@@ -51,7 +51,7 @@ NODES = 4
 """Azimuths within a blade's passage at which the wake over a slope is linearised."""
 
 
-class Base(NamedTuple):
+class WakeBase(NamedTuple):
     """Periodic wake (slices over one revolution) and its model."""
 
     wake: WakeState
@@ -72,13 +72,13 @@ class Base(NamedTuple):
         return jax.tree.map(leaf, self.wake)
 
 
-def _moved(t: Array, x: WakeState, base: Base) -> tuple[WakeState, WakeState]:
+def _moved(t: Array, x: WakeState, base: WakeBase) -> tuple[WakeState, WakeState]:
     """State of all blades with the disturbance x (one slice for all, or B), and the base's own rate."""
     state, rate = jax.jvp(base.at, (t,), (jnp.ones_like(t),))
     return jax.tree.map(lambda a, d: a + d, state, x), rate
 
 
-def disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeState:
+def disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: WakeBase) -> WakeState:
     """Rate of a disturbance of the wake over a slope: one slice for all blades alike, or B."""
     state, own = _moved(t, x, base)
     change = jax.tree.map(jnp.subtract, rhs(t, state, u, base.model), own)
@@ -88,7 +88,7 @@ def disturbed_rhs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeStat
 _compiled = eqx.filter_jit(disturbed_rhs)
 
 
-def disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: Base) -> WakeOutputs:
+def disturbed_outputs(t: Array, x: WakeState, u: WakeInputs, base: WakeBase) -> WakeOutputs:
     """Outputs of the wake with a disturbance, shaped as for `disturbed_rhs`."""
     return outputs(t, _moved(t, x, base)[0], u, base.model)
 
@@ -101,7 +101,7 @@ def residual_of(solution: Solution, parts: Assembly | None = None) -> float:
     if slices(state) == 1:
         parts = assemble(solution) if parts is None else parts
         return relative_rms(parts.value[: parts.order], _flat(state))
-    base, zero = Base(state, model), jax.tree.map(lambda a: jnp.zeros((1, *a.shape[1:])), state)
+    base, zero = WakeBase(state, model), jax.tree.map(lambda a: jnp.zeros((1, *a.shape[1:])), state)
     times = np.asarray(azimuths(state))[: slices(state) // model.rotor.blades]
     rates = [_flat(_compiled(jnp.asarray(t), zero, inputs_of(model), base)) for t in times]
     return relative_rms(np.concatenate(rates), _flat(state))
@@ -160,7 +160,7 @@ def linear_wake(
             return parts.value, np.concatenate([parts.jacobian(), parts.by_input], axis=1)
 
         return linearise(rhs, outputs, orbit, u, solution.model, **chosen, derivative=derivative)
-    return linearise(disturbed_rhs, disturbed_outputs, orbit, u, Base(solution.state, solution.model), **chosen)
+    return linearise(disturbed_rhs, disturbed_outputs, orbit, u, WakeBase(solution.state, solution.model), **chosen)
 
 
 def order_of(model: FreeWake) -> int:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rotorjax.bench.plotting import INK, new_figure, series_colours, style
 from rotorjax.linearisation.found import LinearRotor
-from rotorjax.linearisation.modes import Mode
+from rotorjax.linearisation.modes import RotorMode
 from rotorjax.ode.models import LinearModel
 from rotorjax.trim.run import FREE_WAKE
 
@@ -51,12 +51,12 @@ def pairs(model: LinearModel, told: np.ndarray, *columns: np.ndarray) -> list[tu
     ]
 
 
-def part_of(mode: Mode) -> str:
+def part_of(mode: RotorMode) -> str:
     """Who takes part."""
     return ", ".join(f"{k} {v:.2f}" for k, v in list(mode.states.items())[:MOST_TOLD])
 
 
-def mode_content(mode: Mode) -> dict[str, Any]:
+def mode_content(mode: RotorMode) -> dict[str, Any]:
     """A mode as linearise.json has it."""
     return {
         "name": mode.name,
@@ -68,7 +68,7 @@ def mode_content(mode: Mode) -> dict[str, Any]:
     }
 
 
-def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
+def roots(by_value: dict[float, tuple[RotorMode, ...]], label: str = "advance ratio", where: str = "") -> Figure:
     """Exponents in the plane, one colour a flight, those of the wake hollow; the modes of the one in the middle have
     their names beside them. A line goes with each of the blades' from flight to flight; the wake's, which are only
     numbered, the least damped first, are others in every flight, and have their names where there is one alone.
@@ -97,13 +97,13 @@ def roots(by_value: dict[float, tuple[Mode, ...]], label: str = "advance ratio",
     return figure
 
 
-def _of_blades(mode: Mode) -> bool:
+def _of_blades(mode: RotorMode) -> bool:
     return not mode.name.startswith("wake")
 
 
-def _name(axes: Axes, modes: Sequence[Mode]) -> None:
+def _name(axes: Axes, modes: Sequence[RotorMode]) -> None:
     """Names beside exponents, one under the other where several share a place; slanted at frequencies near zero."""
-    places: dict[tuple[float, float], list[Mode]] = {}
+    places: dict[tuple[float, float], list[RotorMode]] = {}
     for mode in modes:
         places.setdefault((round(mode.exponent.real / ALIKE), round(mode.exponent.imag / ALIKE)), []).append(mode)
     for alike in places.values():

@@ -20,7 +20,7 @@ from rotorjax.linearisation.condensed import Condensed, shares_of
 from rotorjax.linearisation.found import flight_notes
 from rotorjax.linearisation.instant import Instant, instant
 from rotorjax.linearisation.memory import give_back
-from rotorjax.linearisation.modes import FAMILIES, Mode, blade_modes, called, family_of, is_upper, named, numbered
+from rotorjax.linearisation.modes import FAMILIES, RotorMode, blade_modes, called, family_of, is_upper, named, numbered
 from rotorjax.linearisation.rotor import Base
 from rotorjax.linearisation.settled import settled
 from rotorjax.ode.hill import Exponents, exponents
@@ -39,7 +39,7 @@ KINDS = {"0": "collective", "D": "differential"}
 
 
 @dataclass(frozen=True)
-class InWake:
+class WakeFindings:
     """What is known of the model of all states in a free wake. states, azimuths: its numbers. modes: leading ones.
     residual: largest |M v − μ v| of theirs over a passage. step_error (q, m): of its steps against the nonlinear march
     over a revolution. condensed_error (q, m): of the condensed periodic model's steps against its own. thrust: C_T of
@@ -48,7 +48,7 @@ class InWake:
 
     states: int
     azimuths: int
-    modes: tuple[Mode, ...]
+    modes: tuple[RotorMode, ...]
     residual: float
     step_error: Float[np.ndarray, "q m"]
     condensed_error: Float[np.ndarray, "q m"]
@@ -145,7 +145,7 @@ def linear_in_flight(
     done: Callable[[str], None],
     progress: Tell | None = None,
     near: PeriodicModel | None = None,
-) -> tuple[PeriodicModel, InWake]:
+) -> tuple[PeriodicModel, WakeFindings]:
     """Condensed periodic model of a flight in the free wake, and what is known of that of all states.
 
     base: of `base_in_flight`. near: as in `condense`. done(stage) is called after each. Raises InputError as
@@ -165,7 +165,7 @@ def linear_in_flight(
     done("leading modes")
     sizes = np.array([steps.size_of(name) for name in inputs])
     thrust = float(model.part.y[:, outs.index("CT")].mean()) if "CT" in outs else float("nan")
-    return small, InWake(
+    return small, WakeFindings(
         model.part.order,
         model.part.t.size * blades,
         wake_modes(lead, model.part.states),
@@ -186,7 +186,7 @@ def periodic_in_wake(
     return replace(model, notes={**model.notes, **flight_notes(found)})
 
 
-def wake_modes(found: Leading, states: tuple[str, ...]) -> tuple[Mode, ...]:
+def wake_modes(found: Leading, states: tuple[str, ...]) -> tuple[RotorMode, ...]:
     """Leading modes by name: a blade's where its states' own share, with its sign, is the largest, else the wake's.
 
     Shares of a wake's thousands of states have all signs, and their sizes add up to far more than one.
@@ -202,7 +202,7 @@ def wake_modes(found: Leading, states: tuple[str, ...]) -> tuple[Mode, ...]:
     return tuple(numbered([_of_wake(replace(mode, shares=own)) for mode, own in zip(modes, told, strict=True)]))
 
 
-def all_modes(periodic: PeriodicModel, wake: InWake) -> tuple[Mode, ...]:
+def all_modes(periodic: PeriodicModel, wake: WakeFindings) -> tuple[RotorMode, ...]:
     """The blades' modes, those that do not lead from the condensed model, and the leading ones of the wake."""
     parts = exponents(periodic)
     small = named(parts, periodic.states, blade_modes(parts, periodic.states))
@@ -211,7 +211,7 @@ def all_modes(periodic: PeriodicModel, wake: InWake) -> tuple[Mode, ...]:
     return tuple(sorted([*wake.modes, *more], key=lambda mode: -mode.exponent.real))
 
 
-def _of_wake(mode: Mode) -> Mode:
+def _of_wake(mode: RotorMode) -> RotorMode:
     """A mode of the wake by the multi-blade coordinate of the state that takes most part in it."""
     kind, _, state = mode.name.partition(" ")
     if kind != "inflow":

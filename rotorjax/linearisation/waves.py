@@ -20,7 +20,7 @@ from rotorjax.wake.solution import Solution
 
 
 @dataclass(frozen=True)
-class Mode:
+class WaveMode:
     """One unstable mode. wave: p. exponent: λ, growth + i frequency per radian of azimuth (frequency in 1/rev, as seen
     from the blade). multiplier: e^{2πλ}, growth over a revolution. error: bound on what rounding moves the exponent by.
     """
@@ -57,7 +57,7 @@ class Spectrum:
     """
 
     exponents: dict[int, Complex[np.ndarray, " n"]]
-    modes: tuple[Mode, ...]
+    modes: tuple[WaveMode, ...]
     pairing: Pairing
 
 
@@ -87,7 +87,7 @@ def spectrum(solution: Solution, count: int = 4, parts: Assembly | None = None) 
         values = values[np.argsort(-np.real(values))]
         exponents[wave] = values
         leading = [v for v in values[: 2 * count] if not own or v.imag >= 0][:count]  # one of each conjugate pair
-        modes += [Mode(wave, complex(v), rounding(matrix, v)) for v in leading if v.real > 0]
+        modes += [WaveMode(wave, complex(v), rounding(matrix, v)) for v in leading if v.real > 0]
     modes.sort(key=lambda mode: -mode.exponent.real)
     return Spectrum(exponents, tuple(modes), pairing(solution))
 

@@ -30,7 +30,7 @@ from rotorjax.potential.model import FiniteState, FiniteStateModel, answer_means
 from rotorjax.potential.modes import ModeTable
 
 
-class RotorInputs(eqx.Module):
+class InflowInputs(eqx.Module):
     """Inputs at one instant, or over T instants with a leading axis T on every field.
 
     tau (M,): pressure coefficients; mu (): advance ratio, the wind blowing aft; climb (): climb speed; both over ΩR.
@@ -41,10 +41,10 @@ class RotorInputs(eqx.Module):
     climb: Float[Array, "*T"]
 
 
-def hover_inputs(tau: Float[Array, "*T M"]) -> RotorInputs:
+def hover_inputs(tau: Float[Array, "*T M"]) -> InflowInputs:
     """Make the inputs of a hovering rotor."""
     zero = jnp.zeros(tau.shape[:-1], tau.dtype)
-    return RotorInputs(tau, zero, zero)
+    return InflowInputs(tau, zero, zero)
 
 
 def _total_speed(mu: Float[Array, ""], through: Float[Array, ""]) -> Float[Array, ""]:
@@ -59,7 +59,7 @@ def mean_induced_inflow(a: Float[Array, " M"], model: FiniteStateModel) -> Float
 
 
 def _skew(
-    a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel, upflow: Float[Array, ""]
+    a: Float[Array, " M"], inputs: InflowInputs, model: FiniteStateModel, upflow: Float[Array, ""]
 ) -> Float[Array, ""]:
     """X = tan(χ/2) = sin χ/(1 + cos χ) of the mean inflow, χ = atan(μ/λ)."""
     through = inputs.climb + mean_induced_inflow(a, model) - upflow
@@ -82,7 +82,7 @@ def _unskewed(x: Float[Array, ""], vectors: Float[Array, "M ..."], model: Finite
 
 
 def mass_flow(
-    a: Float[Array, " M"], induced: Float[Array, ""], inputs: RotorInputs, model: FiniteStateModel
+    a: Float[Array, " M"], induced: Float[Array, ""], inputs: InflowInputs, model: FiniteStateModel
 ) -> Float[Array, " M"]:
     """Return the diagonal of V at the induced mean flow λ_i through the disk, over ΩR."""
     through = inputs.climb + induced
@@ -92,7 +92,7 @@ def mass_flow(
 
 
 def flow_matrices(
-    a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel, skewed: bool = True
+    a: Float[Array, " M"], inputs: InflowInputs, model: FiniteStateModel, skewed: bool = True
 ) -> tuple[Float[Array, " M"], Float[Array, "M M"]]:
     """Return the diagonal of V and L⁻¹M at the present mass flow and skew.
 
@@ -112,7 +112,7 @@ def rate_table(modes: ModeTable) -> np.ndarray:
 
 @eqx.filter_jit
 def rhs(
-    t: Float[Array, ""], state: FiniteState, inputs: RotorInputs, model: FiniteStateModel, skewed: bool = True
+    t: Float[Array, ""], state: FiniteState, inputs: InflowInputs, model: FiniteStateModel, skewed: bool = True
 ) -> FiniteState:
     """Return d(state)/dψ (Eq. 1); t does not enter. The ground is quasi-steady: c follows a through c = G a.
 
@@ -124,7 +124,7 @@ def rhs(
 
 def rotor_rate(
     a: Float[Array, " M"],
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     upflow: Float[Array, ""],
     skewed: bool = True,
@@ -139,7 +139,7 @@ def rotor_rate(
 def costates(
     psi: Float[Array, " T"],
     a: Float[Array, "T M"],
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     skewed: bool = True,
 ) -> Float[Array, "T M"]:

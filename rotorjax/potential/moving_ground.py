@@ -25,7 +25,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane
-from rotorjax.potential.dynamics import RotorInputs
+from rotorjax.potential.dynamics import InflowInputs
 from rotorjax.potential.model import (
     FiniteStateModel,
     closing,
@@ -124,7 +124,7 @@ def require_variant(variant: str, transport: WakeTransport | None) -> None:
 def flow_into_plane(
     a: Float[Array, " M"],
     motion: GroundMotion,
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     variant: Variant = "quasi-steady",
     transport: WakeTransport | None = None,
@@ -157,7 +157,7 @@ def _plane_flow(motion, inputs, model, variant) -> Float[Array, " N"]:
 def ground_states(
     a: Float[Array, " M"],
     motion: GroundMotion,
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     variant: Variant = "quasi-steady",
     transport: WakeTransport | None = None,
@@ -184,7 +184,7 @@ def residual(
     c: Float[Array, " G"],
     a: Float[Array, " M"],
     motion: GroundMotion,
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     variant: Variant = "quasi-steady",
     transport: WakeTransport | None = None,

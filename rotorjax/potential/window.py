@@ -13,7 +13,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import RotorInputs, costates, flow_matrices, passage, rate_table, rows_at
+from rotorjax.potential.dynamics import InflowInputs, costates, flow_matrices, passage, rate_table, rows_at
 from rotorjax.potential.field import velocity_functions
 from rotorjax.potential.model import FiniteStateModel
 from rotorjax.potential.moving_ground import require_increasing
@@ -61,7 +61,7 @@ def velocity_at(
 def flow_over_window(
     psi: Float[Array, " T"],
     a: Float[Array, "T M"],
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     times: Float[Array, " S"],
     points: Float[Array, "N 3"],
     speed: float,
@@ -92,7 +92,7 @@ def flow_over_window(
 def delayed_costates(
     psi: Float[Array, " T"],
     a: Float[Array, "T M"],
-    inputs: RotorInputs,
+    inputs: InflowInputs,
     model: FiniteStateModel,
     steps: int,
     skewed: bool = False,
@@ -115,7 +115,7 @@ def delayed_costates(
     return jax.lax.map(one, jnp.arange(count - steps))
 
 
-def forgetting_rate(a: Float[Array, " M"], inputs: RotorInputs, model: FiniteStateModel) -> float:
+def forgetting_rate(a: Float[Array, " M"], inputs: InflowInputs, model: FiniteStateModel) -> float:
     """Return the slowest decay rate (per rad) of states and costates about a state, in axial flow."""
     v, _ = flow_matrices(a, inputs, model, skewed=False)
     return float(np.linalg.eigvals(rate_table(model.modes) * np.asarray(v)).real.min())

@@ -21,17 +21,17 @@ from rotorjax.ode import exponential
 from rotorjax.simulation.case import Precision
 from rotorjax.simulation.march import March, MarchState, all_finite, cast, compiled, on_device, precision_of, unknown
 from rotorjax.simulation.step import steps_of_ages, twelfths
-from rotorjax.wake.performance import Performance
+from rotorjax.wake.performance import Coefficients
 from rotorjax.wake.several import SeveralWakes
 from rotorjax.wake.several_dynamics import SeveralInputs, SeveralState, at_one_instant, nominal, rhs
 from rotorjax.wake.several_solution import SeveralSolution
 
-Marched = MarchState[SeveralState, Performance]
+Marched = MarchState[SeveralState, Coefficients]
 
 
 def several_march(
     solution: SeveralSolution, steps_per_turn: int | None = None, *, precision: Precision = "single"
-) -> March[SeveralState, Performance, SeveralInputs]:
+) -> March[SeveralState, Coefficients, SeveralInputs]:
     """March several rotors from their periodic wake, one step at a time (the module tells how).
 
     steps_per_turn: of a revolution at the nominal speed, None for what the wake needs, at least 24. Inputs are
@@ -72,7 +72,7 @@ def advanced(state: Marched, dt: Array, inputs: SeveralInputs, several: SeveralW
 
 def stepped(
     x: SeveralState, dt: Array, inputs: SeveralInputs, several: SeveralWakes
-) -> tuple[SeveralState, Performance]:
+) -> tuple[SeveralState, Coefficients]:
     """The state a step later, azimuths counted on, and the outputs at its start."""
     still = jax.tree.map(lambda _: 0.0, x)
     lag = several.wakes.settings.circulation_lag

@@ -12,7 +12,7 @@ from rotorjax.sweep.case import Axis, SweepCase
 
 
 @dataclass(frozen=True)
-class Point:
+class DesignPoint:
     """One point. index: in the sweep's table. values: (name, value) of each axis."""
 
     index: int
@@ -29,11 +29,11 @@ class Point:
         return hashlib.sha256(repr(sorted(self.values)).encode()).hexdigest()[:16]
 
 
-def points_of(case: SweepCase) -> tuple[Point, ...]:
+def points_of(case: SweepCase) -> tuple[DesignPoint, ...]:
     """All points, the last axis fastest; of a random design in the order of their drawing."""
     names = [axis.name for axis in case.axes]
     rows = _drawn(case) if case.design.kind == "random" else itertools.product(*(axis.values for axis in case.axes))
-    return tuple(Point(k, tuple(zip(names, map(float, row), strict=True))) for k, row in enumerate(rows))
+    return tuple(DesignPoint(k, tuple(zip(names, map(float, row), strict=True))) for k, row in enumerate(rows))
 
 
 def _drawn(case: SweepCase) -> list[list[float]]:
@@ -59,11 +59,11 @@ def _at(axis: Axis, share: float) -> float:
 class Plan:
     """Points in solving order, and the earlier point that each is nearest to: None for the first alone."""
 
-    order: tuple[Point, ...]
-    nearest: dict[Point, Point | None]
+    order: tuple[DesignPoint, ...]
+    nearest: dict[DesignPoint, DesignPoint | None]
 
 
-def plan(points: Sequence[Point]) -> Plan:
+def plan(points: Sequence[DesignPoint]) -> Plan:
     """Grow a tree from the easiest point (high, level, slow), always by the point that is closest to it.
 
     Distances are over the axes' widths, heights as R/h, in which the ground's effect is even; free air is far from
@@ -96,7 +96,7 @@ _GROUND = 0.5
 """How much farther free air is from any ground than its height says."""
 
 
-def _places(points: Sequence[Point]) -> Float[np.ndarray, "N A"]:
+def _places(points: Sequence[DesignPoint]) -> Float[np.ndarray, "N A"]:
     """Places of points, each axis over its width, the easy end lowest."""
     columns = []
     for k, (name, _) in enumerate(points[0].values):

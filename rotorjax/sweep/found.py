@@ -95,27 +95,27 @@ def judged(
 
 
 @dataclass(frozen=True)
-class Start:
+class Neighbour:
     """A solved neighbour: what it was solved for, and what was found."""
 
     prepared: Any
     found: Found
 
 
-class Solver(Protocol):
+class PointSolver(Protocol):
     """Solves prepared points, several at once only where its problem has batches."""
 
     def __call__(
-        self, prepared: Sequence[Any], start: Start | None = None, progress: Progress | None = None
+        self, prepared: Sequence[Any], start: Neighbour | None = None, progress: Progress | None = None
     ) -> list[Found]:
         """What is found at each."""
         ...
 
 
 def from_best(
-    solve: Callable[[Any, Start | None, Progress | None], Found],
+    solve: Callable[[Any, Neighbour | None, Progress | None], Found],
     prepared: Any,
-    start: Start | None,
+    start: Neighbour | None,
     progress: Progress | None,
 ) -> Found:
     """Solve from a neighbour; where that fails, or gives the neighbour's own numbers back, from nothing."""

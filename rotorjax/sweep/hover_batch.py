@@ -14,14 +14,14 @@ from rotorjax.bench.finite_state import model_of
 from rotorjax.bench.settings import settings_of
 from rotorjax.bench.single import check_case
 from rotorjax.errors import InputError
-from rotorjax.inflow.balance import Balance, Flow, Stations, attempt, flow_of, stations_of
+from rotorjax.inflow.balance import Balance, StationFlow, Stations, attempt, flow_of, stations_of
 from rotorjax.limits import check_axial, check_flight
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.model import FiniteStateModel
 from rotorjax.rotor.geometry import Rotor, solidity, twist
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, judged, of_hover, refused
+from rotorjax.sweep.design import DesignPoint
+from rotorjax.sweep.found import Found, Neighbour, Progress, judged, of_hover, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 
 SIZE = 32
@@ -30,7 +30,7 @@ THRUST_TOL, MOST_SECANTS = 1e-11, 20
 
 
 @dataclass(frozen=True)
-class Hover:
+class HoverCase:
     """A hover or climb. guess: C_T that the search starts from. wanted: C_T that the collective is to give, or None."""
 
     model: FiniteStateModel
@@ -45,7 +45,7 @@ class Hover:
         return self.model, self.rotor, self.operating
 
 
-def prepare(case: SweepCase, point: Point) -> Hover:
+def prepare(case: SweepCase, point: DesignPoint) -> HoverCase:
     """Rotor and model of a point. Raises InputError where it is not allowed."""
     values = values_of(case, point)
     rotor, operating = rotor_of(case, values)
@@ -57,10 +57,12 @@ def prepare(case: SweepCase, point: Point) -> Hover:
     guess = check_axial("vpbfsm", rotor, settings.operating) if wanted is None else wanted
     if wanted is not None:
         check_flight("vpbfsm", wanted, settings.climb_ratio)
-    return Hover(model_of(place, settings), rotor, settings.operating, guess, wanted)
+    return HoverCase(model_of(place, settings), rotor, settings.operating, guess, wanted)
 
 
-def solve(prepared: Sequence[Hover], start: Start | None = None, progress: Progress | None = None) -> list[Found]:
+def solve(
+    prepared: Sequence[HoverCase], start: Neighbour | None = None, progress: Progress | None = None
+) -> list[Found]:
     """Solve hovers whose models and rotors have the same shapes; as many lanes as SIZE, so that one program does."""
     del start  # nothing is gained: Newton's method on a few pressure terms
     lanes = [*prepared, *[prepared[-1]] * (-len(prepared) % SIZE)]
@@ -76,7 +78,7 @@ def solve(prepared: Sequence[Hover], start: Start | None = None, progress: Progr
     ]
 
 
-def _solved(lanes: Sequence[Hover], collective: np.ndarray) -> tuple[Balance, np.ndarray]:
+def _solved(lanes: Sequence[HoverCase], collective: np.ndarray) -> tuple[Balance, np.ndarray]:
     """Balances with a leading axis of lanes, as numpy's, and whether each was found."""
     stations = [stations_of(one.rotor) for one in lanes]
     flows = [_flow(one.model, at) for one, at in zip(lanes, stations, strict=True)]
@@ -90,11 +92,11 @@ def _solved(lanes: Sequence[Hover], collective: np.ndarray) -> tuple[Balance, np
 
 
 _search_all = eqx.filter_jit(eqx.filter_vmap(attempt))
-_flows: dict[bytes, Flow] = {}
+_flows: dict[bytes, StationFlow] = {}
 _MOST_FLOWS = 512
 
 
-def _flow(model: FiniteStateModel, at: Stations) -> Flow:
+def _flow(model: FiniteStateModel, at: Stations) -> StationFlow:
     """The costly part of a model, which points that differ in pitch, twist or chord alone share."""
     leaves, structure = jax.tree.flatten((model, at))
     key = repr(structure).encode() + b"".join(np.asarray(leaf).tobytes() for leaf in leaves)
@@ -105,7 +107,7 @@ def _flow(model: FiniteStateModel, at: Stations) -> Flow:
     return _flows[key]
 
 
-def _read(one: Hover, found: Balance, is_found: bool, collective: float) -> Found:
+def _read(one: HoverCase, found: Balance, is_found: bool, collective: float) -> Found:
     CT = float(found.CT)
     climb = float(one.operating.climb_ratio(one.rotor.radius))
     try:
@@ -129,7 +131,7 @@ def _first_pitch(rotor: Rotor, thrust: float) -> float:
     return float(np.clip(np.rad2deg(at_three_quarters - float(twist(rotor, jnp.asarray(0.75)))), -44.0, 44.0))
 
 
-def _pitch_for_thrust(lanes: Sequence[Hover], first: np.ndarray) -> np.ndarray:
+def _pitch_for_thrust(lanes: Sequence[HoverCase], first: np.ndarray) -> np.ndarray:
     """Collectives (rad) that give the wanted thrusts, by the secant method on all lanes together."""
     wanted = np.array([one.wanted for one in lanes], float)
 

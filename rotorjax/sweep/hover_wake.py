@@ -12,8 +12,8 @@ from rotorjax.bench.single import Solver as WakeSolver
 from rotorjax.bench.single import check_case
 from rotorjax.bench.wake_file import lost_at, model_of, start_of, state_arrays, to_dataset
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, from_best, judged, of_hover
+from rotorjax.sweep.design import DesignPoint
+from rotorjax.sweep.found import Found, Neighbour, Progress, from_best, judged, of_hover
 from rotorjax.sweep.rotors import rotor_of, values_of
 from rotorjax.wake.solution import solve as solve_wake
 
@@ -26,7 +26,7 @@ class WakeHover:
     settings: StudySettings
 
 
-def prepare(case: SweepCase, point: Point) -> WakeHover:
+def prepare(case: SweepCase, point: DesignPoint) -> WakeHover:
     """Rotor and wake of a point. Raises InputError where it is not allowed."""
     values = values_of(case, point)
     rotor, operating = rotor_of(case, values)
@@ -45,19 +45,19 @@ def prepare(case: SweepCase, point: Point) -> WakeHover:
 
 def solve(
     prepared: Sequence[WakeHover],
-    start: Start | None = None,
+    start: Neighbour | None = None,
     progress: Progress | None = None,
     solver: WakeSolver = solve_wake,
 ) -> list[Found]:
     """Solve hovers one after the other from the same start."""
 
-    def one(wanted: WakeHover, near: Start | None, show: Progress | None) -> Found:
+    def one(wanted: WakeHover, near: Neighbour | None, show: Progress | None) -> Found:
         return _solve(wanted, near, show, solver)
 
     return [from_best(one, wanted, start, progress) for wanted in prepared]
 
 
-def _solve(wanted: WakeHover, near: Start | None, progress: Progress | None, solver: WakeSolver) -> Found:
+def _solve(wanted: WakeHover, near: Neighbour | None, progress: Progress | None, solver: WakeSolver) -> Found:
     begin = None if near is None else start_of(near.prepared.case, near.prepared.settings, near.found.state)
     found = solver(model_of(wanted.case, wanted.settings), begin, progress)
     lost = None if found.converged else lost_at(to_dataset(wanted.case, found, wanted.settings))

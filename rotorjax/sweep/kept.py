@@ -13,14 +13,14 @@ import xarray as xr
 from rotorjax.bench.kept import check_same, fingerprint, taken_up
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import make_folder
-from rotorjax.sweep.design import Point
+from rotorjax.sweep.design import DesignPoint
 from rotorjax.sweep.found import QUANTITIES, Found
 
 STATE = "state_"
 
 
 @dataclass(frozen=True)
-class Shelf:
+class PointShelf:
     """The folder of a sweep's finished points. table: what they were made with."""
 
     folder: Path
@@ -35,18 +35,18 @@ class Shelf:
         """Make the folder. Raises InputError where it cannot be written."""
         make_folder(make_folder(self.folder) / "points")
 
-    def path(self, points: Sequence[Point]) -> Path:
+    def path(self, points: Sequence[DesignPoint]) -> Path:
         """File of points that were solved at once; its name is theirs."""
         name = points[0].name
         if len(points) > 1:
             name = hashlib.sha256("".join(point.name for point in points).encode()).hexdigest()[:16]
         return self.folder / "points" / f"{name}.nc"
 
-    def keep(self, points: Sequence[Point], found: Sequence[Found]) -> None:
+    def keep(self, points: Sequence[DesignPoint], found: Sequence[Found]) -> None:
         """Keep finished points. Raises InputError where they cannot be written."""
         netcdf.write(self.path(points), _dataset(points, found, self.fingerprint, self.table))
 
-    def take_up(self, points: Sequence[Point], say: Callable[[str], None]) -> list[Found] | None:
+    def take_up(self, points: Sequence[DesignPoint], say: Callable[[str], None]) -> list[Found] | None:
         """What is kept of points, None where nothing is; a file that is damaged or of other points is set aside.
 
         Raises InputError where it was made with other settings.
@@ -61,7 +61,9 @@ class Shelf:
         return None if data is None else _founds(data)
 
 
-def _dataset(points: Sequence[Point], found: Sequence[Found], fingerprint: str, table: dict[str, Any]) -> xr.Dataset:
+def _dataset(
+    points: Sequence[DesignPoint], found: Sequence[Found], fingerprint: str, table: dict[str, Any]
+) -> xr.Dataset:
     """Points along `point`; states only of one alone."""
     data = xr.Dataset(
         {

@@ -8,8 +8,8 @@ from rotorjax.bench.settings import settings_of
 from rotorjax.rotor import catalogue
 from rotorjax.sweep import hover_batch, hover_wake, trims
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Solver
+from rotorjax.sweep.design import DesignPoint
+from rotorjax.sweep.found import PointSolver
 from rotorjax.trim.run import FREE_WAKE
 
 
@@ -19,8 +19,8 @@ class Problem:
     where each starts from another.
     """
 
-    prepare: Callable[[SweepCase, Point], Any]
-    solve: Solver
+    prepare: Callable[[SweepCase, DesignPoint], Any]
+    solve: PointSolver
     batch: int = 1
 
 

@@ -9,10 +9,10 @@ from rotorjax.rotor import catalogue
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.rotor_file import SCHEMA
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point
+from rotorjax.sweep.design import DesignPoint
 
 
-def values_of(case: SweepCase, point: Point) -> dict[str, Any]:
+def values_of(case: SweepCase, point: DesignPoint) -> dict[str, Any]:
     """All keys of a point, those of rotor files too; no height where it is inf, and no slope there."""
     values = case.fixed | dict(point.values)
     if values.get("height") == float("inf"):

@@ -11,13 +11,13 @@ import jax
 from rotorjax.bench.progress import Progress
 from rotorjax.errors import InputError
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point, plan, points_of
-from rotorjax.sweep.found import Found, Solver, Start, refused
-from rotorjax.sweep.kept import Shelf
+from rotorjax.sweep.design import DesignPoint, plan, points_of
+from rotorjax.sweep.found import Found, Neighbour, PointSolver, refused
+from rotorjax.sweep.kept import PointShelf
 from rotorjax.sweep.pools import Here, Job, Pool
 from rotorjax.sweep.problem import Problem, problem_of, table_of
 
-Task = tuple[Point, ...]
+Task = tuple[DesignPoint, ...]
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class Swept:
     """A sweep that ran to its end. points, found: in the order of the case's table. table: what it was made with."""
 
     case: SweepCase
-    points: tuple[Point, ...]
+    points: tuple[DesignPoint, ...]
     found: tuple[Found, ...]
     table: dict[str, Any]
 
     @property
-    def failures(self) -> list[tuple[Point, Found]]:
+    def failures(self) -> list[tuple[DesignPoint, Found]]:
         """Points that did not converge."""
         return [(p, one) for p, one in zip(self.points, self.found, strict=True) if not one.solved]
 
@@ -41,10 +41,10 @@ class Work:
     with the point that it would start from.
     """
 
-    prepared: dict[Point, Any]
-    refused: dict[Point, Found]
+    prepared: dict[DesignPoint, Any]
+    refused: dict[DesignPoint, Found]
     tasks: tuple[Task, ...]
-    nearest: dict[Point, Point | None]
+    nearest: dict[DesignPoint, DesignPoint | None]
 
 
 def prepare(case: SweepCase, problem: Problem) -> Work:
@@ -64,9 +64,9 @@ def prepare(case: SweepCase, problem: Problem) -> Work:
     return Work(prepared, not_allowed, tuple((point,) for point in planned.order), planned.nearest)
 
 
-def _batches(prepared: dict[Point, Any], size: int) -> tuple[Task, ...]:
+def _batches(prepared: dict[DesignPoint, Any], size: int) -> tuple[Task, ...]:
     """Points whose arrays have the same shapes, so many at a time; the same points make the same batches."""
-    alike: dict[Any, list[Point]] = {}
+    alike: dict[Any, list[DesignPoint]] = {}
     for point, one in prepared.items():
         arrays, rest = eqx.partition(one.arrays, eqx.is_array)
         key = (str(jax.tree.structure(rest)), tuple(leaf.shape for leaf in jax.tree.leaves(arrays)))
@@ -79,7 +79,7 @@ def sweep(
     folder: str | Path,
     *,
     pool: Callable[[Progress], Pool] | None = None,
-    solver: Solver | None = None,
+    solver: PointSolver | None = None,
 ) -> Swept:
     """Solve all points, keeping each in folder/points as soon as it is done; what is there is not solved again.
 
@@ -87,7 +87,7 @@ def sweep(
     point starts from its nearest solved neighbour in the plan, so that stopping and going on changes nothing. Raises
     InputError where no point is allowed, or the folder cannot be written or holds another sweep.
     """
-    problem, shelf = problem_of(case), Shelf(Path(folder), table_of(case))
+    problem, shelf = problem_of(case), PointShelf(Path(folder), table_of(case))
     work = prepare(case, problem)
     shelf.open()
     points = points_of(case)
@@ -107,7 +107,7 @@ def sweep(
 
 
 def _work_off(
-    work: Work, solver: Solver, pool: Pool, found: dict[Point, Found], shelf: Shelf, progress: Progress
+    work: Work, solver: PointSolver, pool: Pool, found: dict[DesignPoint, Found], shelf: PointShelf, progress: Progress
 ) -> None:
     """Submit each task once the point that it starts from is done, and keep what comes back."""
     waiting = [task for task in work.tasks if task[0] not in found]
@@ -130,7 +130,7 @@ def _work_off(
 
 
 def solved(
-    solver: Solver, prepared: Sequence[Any], start: Start | None, show: Callable[[str, float], None] | None
+    solver: PointSolver, prepared: Sequence[Any], start: Neighbour | None, show: Callable[[str, float], None] | None
 ) -> list[Found]:
     """What a solver finds; what it refuses is a point without a solution."""
     try:
@@ -139,14 +139,14 @@ def solved(
         return [refused(str(error))] * len(prepared)
 
 
-def _is_ready(task: Task, work: Work, found: dict[Point, Found]) -> bool:
+def _is_ready(task: Task, work: Work, found: dict[DesignPoint, Found]) -> bool:
     near = work.nearest[task[0]]
     return near is None or near in found
 
 
-def start_of(point: Point, work: Work, found: dict[Point, Found]) -> Start | None:
+def start_of(point: DesignPoint, work: Work, found: dict[DesignPoint, Found]) -> Neighbour | None:
     """The nearest point of the plan that converged, and where it did not, the one that it was to start from, and on."""
     near = work.nearest[point]
     while near is not None and not (found[near].solved and found[near].state):
         near = work.nearest[near]
-    return None if near is None else Start(work.prepared[near], found[near])
+    return None if near is None else Neighbour(work.prepared[near], found[near])

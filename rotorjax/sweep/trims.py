@@ -14,8 +14,8 @@ from rotorjax.coupled import CoupledState
 from rotorjax.errors import InputError
 from rotorjax.linearisation.readings import readings
 from rotorjax.sweep.case import SweepCase
-from rotorjax.sweep.design import Point
-from rotorjax.sweep.found import Found, Progress, Start, dimensional, judged, refused
+from rotorjax.sweep.design import DesignPoint
+from rotorjax.sweep.found import Found, Neighbour, Progress, dimensional, judged, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 from rotorjax.trim import run as trimming
 from rotorjax.trim.in_wake import TrimmedInWake
@@ -29,7 +29,7 @@ READ = ("CT", "CP", "CP_induced", "CP_profile", "CP_parasite", "CP_damper", "fig
 ANGLES = ("theta_1c_deg", "theta_1s_deg", "tilt_deg", "beta_0_deg", "beta_1c_deg", "beta_1s_deg")
 
 
-def prepare(case: SweepCase, point: Point) -> Request:
+def prepare(case: SweepCase, point: DesignPoint) -> Request:
     """The request of a point. Raises InputError where it is not allowed."""
     values = values_of(case, point)
     rotor, operating = rotor_of(case, values)
@@ -57,12 +57,12 @@ def _azimuths(case: SweepCase, blades: int) -> dict:
     return {"azimuths": 2 * blades, **case.wake}
 
 
-def solve(prepared: Sequence[Request], start: Start | None = None, progress: Progress | None = None) -> list[Found]:
+def solve(prepared: Sequence[Request], start: Neighbour | None = None, progress: Progress | None = None) -> list[Found]:
     """Trim one after the other from the same start, and from nothing where that leads nowhere."""
     return [_solve(request, start, progress) for request in prepared]
 
 
-def _solve(request: Request, near: Start | None, progress: Progress | None) -> Found:
+def _solve(request: Request, near: Neighbour | None, progress: Progress | None) -> Found:
     try:
         result = trimming.run(request, None if near is None else restored(near.prepared, near.found.state), progress)
     except InputError as error:

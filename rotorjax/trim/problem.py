@@ -31,7 +31,7 @@ class Controls(eqx.Module):
     tilt: Float[Array, ""]
 
 
-class Flight(eqx.Module):
+class SteadyFlight(eqx.Module):
     """Steady flight; every field is a scalar array.
 
     thrust: C_T along the shaft that is wanted. advance: horizontal speed over ΩR. climb: vertical speed over ΩR. tilt:
@@ -55,7 +55,7 @@ class Trim(eqx.Module):
     controls: Controls
 
 
-def inputs_at(controls: Controls, flight: Flight) -> RotorInputs:
+def inputs_at(controls: Controls, flight: SteadyFlight) -> RotorInputs:
     """The rotor's inputs in steady flight: velocities of the hub along the tilted shaft's axes."""
     zero = jnp.zeros_like(controls.tilt)
     sine, cosine = jnp.sin(controls.tilt), jnp.cos(controls.tilt)
@@ -108,7 +108,7 @@ class TrimResidual(eqx.Module):
         derivative = Collocation(Still(), symmetry, self.blades)
         return derivative((z.rotor, z.inflow), jnp.zeros(()), jnp.asarray(2 * jnp.pi))
 
-    def __call__(self, z: Trim, flight: Flight, p: CoupledRotor) -> Trim:
+    def __call__(self, z: Trim, flight: SteadyFlight, p: CoupledRotor) -> Trim:
         """Residual, shaped like the unknowns."""
         rates, found = rates_and_outputs(z, flight, p)
         orbit = jax.tree.map(jnp.subtract, self.slopes(z), (rates.rotor, rates.inflow))
@@ -129,7 +129,7 @@ def node_azimuths(z: Trim, blades: int) -> Float[Array, " K"]:
     return 2 * jnp.pi / (nodes * blades) * jnp.arange(nodes)
 
 
-def rates_and_outputs(z: Trim, flight: Flight, p: CoupledRotor) -> tuple[CoupledState, Outputs]:
+def rates_and_outputs(z: Trim, flight: SteadyFlight, p: CoupledRotor) -> tuple[CoupledState, Outputs]:
     """Rates and outputs at all nodes, leading axis K."""
     u = inputs_at(z.controls, flight)
 
@@ -140,7 +140,7 @@ def rates_and_outputs(z: Trim, flight: Flight, p: CoupledRotor) -> tuple[Coupled
 
 
 @eqx.filter_jit
-def outputs_at(z: Trim, flight: Flight, p: CoupledRotor) -> Outputs:
+def outputs_at(z: Trim, flight: SteadyFlight, p: CoupledRotor) -> Outputs:
     """Outputs at all nodes, leading axis K: equal weights make them means over time."""
     return rates_and_outputs(z, flight, p)[1]
 

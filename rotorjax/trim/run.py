@@ -66,7 +66,7 @@ class Request:
         return None if self.height is None else plane(self.height, self.slope_deg)
 
     @property
-    def flight(self) -> problem.Flight:
+    def flight(self) -> problem.SteadyFlight:
         """The flight condition in rotor units. Raises InputError where something of it is not allowed."""
         area = np.pi * float(self.rotor.radius) ** 2
         share = 0.0 if self.drag_area is None else self.drag_area / area
@@ -146,7 +146,7 @@ def run(request: Request, start: Trimmed | TrimmedInWake | None = None, progress
     return Result(request, found, means(found), verdict(found), time.perf_counter() - begun)
 
 
-def prepare(request: Request) -> tuple[CoupledRotor, problem.Flight, TrimResidual]:
+def prepare(request: Request) -> tuple[CoupledRotor, problem.SteadyFlight, TrimResidual]:
     """Rotor, flight and equations of a request with an inflow model."""
     check(request)
     p = coupled_rotor(request.rotor, request.operating, inflow_model(request.inflow, request.ground))

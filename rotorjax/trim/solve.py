@@ -16,7 +16,7 @@ from rotorjax.ode.implicit import attach
 from rotorjax.ode.newton import newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.rotor.geometry import chord, solidity, twist
-from rotorjax.trim.problem import Controls, Flight, Trim, TrimResidual, inputs_at, outputs_at
+from rotorjax.trim.problem import Controls, SteadyFlight, Trim, TrimResidual, inputs_at, outputs_at
 
 TOL = 1e-9  # largest equation left over: angles in rad, thrust over the wanted one
 AZIMUTHS = 24  # of a revolution
@@ -29,7 +29,7 @@ class Trimmed:
     z: Trim
     outcome: Outcome
     residual: TrimResidual
-    flight: Flight
+    flight: SteadyFlight
     p: CoupledRotor
 
     @property
@@ -45,7 +45,7 @@ def flight(
     tilt: float = 0.0,
     drag_area: float = 0.0,
     height: float | None = None,
-) -> Flight:
+) -> SteadyFlight:
     """Make a flight condition, tilt in rad, speeds over ΩR, drag_area over the disk's area, height over R.
 
     Raises InputError where a value is not finite, thrust or height is not positive, advance not in [0, 0.5], the tilt
@@ -64,7 +64,7 @@ def flight(
                 f"but is {height:g}"
             )
     scalars = (jnp.asarray(v, float) for v in (thrust, advance, climb, tilt, drag_area))
-    return Flight(*scalars, height=None if height is None else jnp.asarray(height, float))
+    return SteadyFlight(*scalars, height=None if height is None else jnp.asarray(height, float))
 
 
 def most_thrust(p: CoupledRotor, advance: float) -> float:
@@ -75,7 +75,7 @@ def most_thrust(p: CoupledRotor, advance: float) -> float:
     return float(p.rotor.blades / jnp.pi * most * jnp.sum(dynamic * sections.widths * sections.lifting))
 
 
-def guess(p: CoupledRotor, flight: Flight, azimuths: int = AZIMUTHS) -> Trim:
+def guess(p: CoupledRotor, flight: SteadyFlight, azimuths: int = AZIMUTHS) -> Trim:
     """Uniform inflow and linear lift without stall: collective for the thrust, cyclic that keeps the disk level."""
     blades, mu = p.rotor.blades, float(flight.advance)
     thrust = float(flight.thrust)
@@ -108,7 +108,7 @@ def largest(f: np.ndarray, x: np.ndarray) -> float:
 
 def trim(
     p: CoupledRotor,
-    flight: Flight,
+    flight: SteadyFlight,
     residual: TrimResidual | None = None,
     start: Trim | None = None,
     azimuths: int = AZIMUTHS,
@@ -134,7 +134,7 @@ def trim(
     return found if outcome.converged or start is not None else _raised(found, p, flight, azimuths)
 
 
-def _raised(failed: Trimmed, p: CoupledRotor, flight: Flight, azimuths: int) -> Trimmed:
+def _raised(failed: Trimmed, p: CoupledRotor, flight: SteadyFlight, azimuths: int) -> Trimmed:
     """Raise the thrust in steps to the wanted one, each trim from the last; if that fails, say how far it came."""
     wanted, reached, z = float(flight.thrust), 0.0, None
     step = wanted / 2
@@ -156,11 +156,11 @@ def _raised(failed: Trimmed, p: CoupledRotor, flight: Flight, azimuths: int) -> 
 
 
 @eqx.filter_jit
-def power(z: Trim, flight: Flight, p: CoupledRotor) -> Float[Array, ""]:
+def power(z: Trim, flight: SteadyFlight, p: CoupledRotor) -> Float[Array, ""]:
     """Mean C_P = C_Q of a trim."""
     return jnp.mean(outputs_at(z, flight, p).CQ)
 
 
-def trimmed_power(found: Trimmed, flight: Flight, p: CoupledRotor) -> Float[Array, ""]:
+def trimmed_power(found: Trimmed, flight: SteadyFlight, p: CoupledRotor) -> Float[Array, ""]:
     """C_P of a converged trim as a function of flight and rotor, differentiable by the implicit function theorem."""
     return power(attach(found.residual, found.z, flight, p), flight, p)

@@ -16,7 +16,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Complex, Float
 
 from rotorjax.linearisation.system import outputs
-from rotorjax.linearisation.waves import Mode, Pairing, spectrum, wave_matrix
+from rotorjax.linearisation.waves import Pairing, WaveMode, spectrum, wave_matrix
 from rotorjax.ode.fourier import fourier_coefficients
 from rotorjax.ode.trajectory import march
 from rotorjax.wake.dynamics import inputs_of, rhs
@@ -32,7 +32,7 @@ class Fastest(NamedTuple):
     decay: largest |λ| of its wave number, which the step of a march has to hold. pairing: the rate beside it.
     """
 
-    mode: Mode
+    mode: WaveMode
     left: Complex[np.ndarray, " n"]
     decay: float
     pairing: Pairing

@@ -16,7 +16,7 @@ from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
 from rotorjax.validation.measure import tip_path
 from rotorjax.validation.point import Point, point
 from rotorjax.validation.polars import ROTORS
-from rotorjax.validation.row import Against, Limits, Row, above_zero, absolute, between
+from rotorjax.validation.row import Against, Allowed, Row, above_zero, absolute, between
 from rotorjax.wake.solution import Solution
 
 NAME = "ground"
@@ -88,13 +88,13 @@ def inflow_ratio(near: Solution, alone: Solution) -> float:
     return float(near.mean_inflow / np.sqrt(near.CT) / (alone.mean_inflow / np.sqrt(alone.CT)))
 
 
-def _limits(at: Point) -> Limits | None:
+def _limits(at: Point) -> Allowed | None:
     """Where the power ratio has to lie: about the measured curve; of a helicopter's rotor, up to Hayden's as well."""
     measured, flown = reference.isolated_rotors(_height(at)), reference.hayden(_height(at))
     if measured is None or not flies(at.rotor):
         return None if measured is None else absolute(MARGIN, measured)
     low, high = sorted((measured, flown))
-    return Limits(measured, low - MARGIN, high + MARGIN, f"{low:.3f} to {high:.3f}, ±{MARGIN:g}")
+    return Allowed(measured, low - MARGIN, high + MARGIN, f"{low:.3f} to {high:.3f}, ±{MARGIN:g}")
 
 
 def flies(rotor: str) -> bool:

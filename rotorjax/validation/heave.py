@@ -66,7 +66,7 @@ class Each(NamedTuple, Generic[T]):
         return Each(f(self.free), f(self.quasi_steady), f(self.dynamic))
 
 
-class March(NamedTuple):
+class HeaveChanges(NamedTuple):
     """Changes (N, 2) of induced mean inflow and C_T: the nonlinear wake's, the linear one's, the dynamic VPBFSM's."""
 
     nonlinear: Float[np.ndarray, "N 2"]
@@ -94,14 +94,14 @@ def compare(subject: Subject, wakes: Wakes) -> Comparison:
     return Comparison([*found, march_row(at[-1], march)], lambda: draw(at, models, march))
 
 
-def in_time(solution: Solution, models: Each[Heaving]) -> March:
+def in_time(solution: Solution, models: Each[Heaving]) -> HeaveChanges:
     """A small heave from rest; NaN where the march fails."""
     heave, psi = Heave(jnp.asarray(SIZE), jnp.asarray(MARCHED)), instants()
     try:
         nonlinear = marched(solution, heave)
     except InputError:
         nonlinear = np.full((psi.size, 2), np.nan)
-    return March(nonlinear, models.free.history(heave), models.dynamic.history(heave))
+    return HeaveChanges(nonlinear, models.free.history(heave), models.dynamic.history(heave))
 
 
 def rows(at: Point, models: Each[Heaving]) -> list[Row]:
@@ -123,7 +123,7 @@ def rows(at: Point, models: Each[Heaving]) -> list[Row]:
     return found
 
 
-def march_row(at: Point, march: March) -> Row:
+def march_row(at: Point, march: HeaveChanges) -> Row:
     """Largest difference of the inflow between march and linear model, over the largest change."""
     apart = np.abs(march.nonlinear - march.linear)[:, 0].max() / np.abs(march.linear[:, 0]).max()
     name = f"march of {SIZE:g} R at {MARCHED:g}/rev against the linear model, over its largest δλ₀, h = {at.height:g}"
@@ -158,7 +158,7 @@ LOOKS: Each[dict[str, Any]] = Each(
 )
 
 
-def draw(at: tuple[Point, ...], models: list[Each[Heaving]], march: March) -> Figure:
+def draw(at: tuple[Point, ...], models: list[Each[Heaving]], march: HeaveChanges) -> Figure:
     """Size and phase over frequency: the inflow at each height, C_T at the last; and the march."""
     with style():
         figure = new_figure(16.0, 6.4)

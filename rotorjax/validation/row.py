@@ -15,7 +15,7 @@ class Against:
 
 
 @dataclass(frozen=True)
-class Limits:
+class Allowed:
     """Where a number has to lie. reference: None where there is only a range. low, high: both ends included; either
     may be infinite. allowed: the same in words.
     """
@@ -37,7 +37,7 @@ class Row:
     case: str
     quantity: str
     ours: float
-    limits: Limits
+    limits: Allowed
     against: Against
     note: str = ""
     wakes: tuple[str, ...] = ()
@@ -76,24 +76,24 @@ class Row:
         }
 
 
-def relative(share: float, reference: float) -> Limits:
-    """Limits a share of the reference on either side of it (0.03 is 3 %)."""
+def relative(share: float, reference: float) -> Allowed:
+    """Within a share of the reference on either side of it (0.03 is 3 %)."""
     margin = share * abs(reference)
-    return Limits(reference, reference - margin, reference + margin, f"±{100 * share:.3g} %")
+    return Allowed(reference, reference - margin, reference + margin, f"±{100 * share:.3g} %")
 
 
-def absolute(margin: float, reference: float) -> Limits:
-    """Limits a margin on either side of the reference, in its own unit."""
-    return Limits(reference, reference - margin, reference + margin, f"±{margin:.3g}")
+def absolute(margin: float, reference: float) -> Allowed:
+    """Within a margin on either side of the reference, in its own unit."""
+    return Allowed(reference, reference - margin, reference + margin, f"±{margin:.3g}")
 
 
-def between(low: float, high: float) -> Limits:
+def between(low: float, high: float) -> Allowed:
     """A range without a reference; either end may be infinite."""
     if math.isinf(high):
-        return Limits(None, low, high, f"at least {low:.3g}")
-    return Limits(None, low, high, f"at most {high:.3g}" if math.isinf(low) else f"{low:.3g} to {high:.3g}")
+        return Allowed(None, low, high, f"at least {low:.3g}")
+    return Allowed(None, low, high, f"at most {high:.3g}" if math.isinf(low) else f"{low:.3g} to {high:.3g}")
 
 
-def above_zero() -> Limits:
+def above_zero() -> Allowed:
     """Any positive number."""
-    return Limits(None, math.nextafter(0.0, 1.0), math.inf, "above 0")
+    return Allowed(None, math.nextafter(0.0, 1.0), math.inf, "above 0")

@@ -4,26 +4,17 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from tqdm import tqdm
 
 from rotorjax.bench.schedule import Schedule
+from rotorjax.bench.single import Solver
 from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.point import Point, needed
 from rotorjax.validation.row import Row
-from rotorjax.wake.model import FreeWake
 from rotorjax.wake.solution import Solution, solve
 
 Progress = Callable[[str, float], None]
-
-
-class Solver(Protocol):
-    """What solves the free wake: rotorjax.wake.solution.solve."""
-
-    def __call__(self, model: FreeWake, start: Solution | None, progress: Progress | None) -> Solution:
-        """Return the periodic wake of `model`."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
 from rotorjax.wake.kernel_pairs import between, cross, dot, influence, nonzero, subtract
 from rotorjax.wake.kernel_rule import BiotSavart
-from rotorjax.wake.kernel_sweeps import Segments, Settings
+from rotorjax.wake.kernel_sweeps import KernelSegments, KernelSettings
 
 
 def segment_velocity(
@@ -124,7 +124,7 @@ def _velocity(settings, points, start, end, strength, core, plane: Plane | None,
     if not points.shape[0] or not strength.shape[0]:
         return jnp.zeros_like(points)
     soft = jnp.sum((end - start) ** 2, axis=1) * core**2
-    segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
+    segments = KernelSegments(start.T, end.T, strength / (4 * jnp.pi), soft)
     angles = jnp.asarray(2 * np.pi / blades * np.arange(blades)[:, None], points.dtype)
     sides = points[None] if plane is None else jnp.stack([points, plane.reflect_points(points)])
     # one sum for all copies, (sides, blades, N, 3)
@@ -175,7 +175,7 @@ def _stored(
     return between(r1, r2, tuple((end - start).T), soft)
 
 
-def _settings(exponent: float, blades: int, block: int | None, chained: bool) -> Settings:
+def _settings(exponent: float, blades: int, block: int | None, chained: bool) -> KernelSettings:
     if not exponent >= 1:
         raise InputError(f"Argument `exponent` must be at least 1, but is {exponent}")
     if blades < 1:
@@ -183,7 +183,7 @@ def _settings(exponent: float, blades: int, block: int | None, chained: bool) ->
     if block is not None and block < 1:
         raise InputError(f"Argument `block` must be at least 1, but is {block}")
     # on a CPU eight rows of pairs stay in cache; an accelerator wants all at once, or fewer and larger steps
-    return Settings(exponent, chained, block or (8 if on_cpu() else 64), at_once=not (block or on_cpu()))
+    return KernelSettings(exponent, chained, block or (8 if on_cpu() else 64), at_once=not (block or on_cpu()))
 
 
 def _check_segments(points, strength, core, shape: tuple[int, ...]) -> None:

@@ -18,10 +18,10 @@ from jaxtyping import Array, Complex, Float
 
 from rotorjax.errors import InputError
 from rotorjax.frames import rotate_about_shaft
-from rotorjax.wake import kernel_sweeps
 from rotorjax.wake.above import above_ground
 from rotorjax.wake.field import self_induction
 from rotorjax.wake.kernel_pairs import cross, pairs, slopes
+from rotorjax.wake.kernel_sweeps import KernelSegments
 from rotorjax.wake.model import FreeWake, WakeState, along_blade, azimuths, slices
 from rotorjax.wake.segments import Segments, bound_vortex, far_filaments, join, lattice_segments, near_lattice, releases
 
@@ -35,7 +35,7 @@ class PairDerivatives(NamedTuple):
     soft: Float[Array, "N S 3"]
 
 
-def pair_derivatives(points: Float[Array, "N 3"], segments: kernel_sweeps.Segments) -> PairDerivatives:
+def pair_derivatives(points: Float[Array, "N 3"], segments: KernelSegments) -> PairDerivatives:
     """Derivatives of every segment's velocity at every point (Scully's core); by the point it is −(start + end).
 
     With v = g k c and c = l × r₁ = l × r₂ (formulas of kernel_pairs.py): c' = e' × r₁ − s' × r₂ for moved ends s, e.
@@ -162,7 +162,7 @@ def _seen(model: FreeWake, points: Float[Array, "N 3"]) -> list[tuple[Array, Arr
     return [(points, jnp.eye(3)), (model.ground.reflect_points(points), mirror)]
 
 
-def _by_place(model: FreeWake, points: Float[Array, "N 3"], segments: kernel_sweeps.Segments) -> Float[Array, "N 3 3"]:
+def _by_place(model: FreeWake, points: Float[Array, "N 3"], segments: KernelSegments) -> Float[Array, "N 3 3"]:
     """Derivative of the velocity at points by their own places, of all blades' segments."""
 
     def add(total, of_blade):
@@ -201,7 +201,7 @@ def _of_all(
     return jnp.moveaxis(found, 0, 2)
 
 
-def _sharpened(points: Float[Array, "N 3"], lattice: kernel_sweeps.Segments, fine: Float[Array, ""]) -> PairDerivatives:
+def _sharpened(points: Float[Array, "N 3"], lattice: KernelSegments, fine: Float[Array, ""]) -> PairDerivatives:
     """Derivatives of `biot_savart.sharpened_velocity`, the fine core's softening |l|² fine² moving with the ends."""
     edge = (lattice.end - lattice.start).T
     softs = jnp.stack([jnp.sum(edge**2, axis=-1) * fine**2, lattice.soft])
@@ -243,9 +243,9 @@ def _blade_sum(model: FreeWake, targets, segments, phase):
     return jax.lax.scan(add, start, (places, to, back, phases))[0]
 
 
-def _kernel_form(segments: Segments) -> kernel_sweeps.Segments:
+def _kernel_form(segments: Segments) -> KernelSegments:
     soft = jnp.sum((segments.end - segments.start) ** 2, axis=1) * segments.core**2
-    return kernel_sweeps.Segments(segments.start.T, segments.end.T, segments.strength / (4 * jnp.pi), soft)
+    return KernelSegments(segments.start.T, segments.end.T, segments.strength / (4 * jnp.pi), soft)
 
 
 def _chain(by_segments: PairDerivatives, of_state: Callable, flat: Float[Array, " m"]):
@@ -253,7 +253,7 @@ def _chain(by_segments: PairDerivatives, of_state: Callable, flat: Float[Array, 
     back = jax.vjp(of_state, flat)[1]
 
     def row(start, end, strength, soft):
-        return back(kernel_sweeps.Segments(start.T, end.T, strength, soft))[0]
+        return back(KernelSegments(start.T, end.T, strength, soft))[0]
 
     # one row for each point and component: segments stand last but one, or last
     rows = [jnp.swapaxes(d, 1, 2) for d in by_segments]

@@ -12,7 +12,7 @@ from jax import Array
 from jax.experimental import hijax
 from jax.experimental.hijax import Zero, instantiate_zeros
 
-from rotorjax.wake.kernel_sweeps import Segments, Settings, cotangents, velocity, velocity_and_tangent
+from rotorjax.wake.kernel_sweeps import KernelSegments, KernelSettings, cotangents, velocity, velocity_and_tangent
 
 if TYPE_CHECKING:
     from jax.experimental.hijax import VJPHiPrimitive as HiPrim
@@ -23,9 +23,9 @@ else:  # its name since jax 0.11, and before
 class BiotSavart(HiPrim):
     """Velocity (3, N) at points (3, N) induced by segments, with O(N + S) memory in every mode."""
 
-    settings: Settings
+    settings: KernelSettings
 
-    def __init__(self, settings: Settings, points: Array, segments: Segments):
+    def __init__(self, settings: KernelSettings, points: Array, segments: KernelSegments):
         """Make the primitive for the shapes of these arguments."""
         self.in_avals = (jax.typeof(points), jax.tree.map(jax.typeof, segments))
         self.out_aval = jax.typeof(points)

@@ -24,7 +24,7 @@ AT_ONCE = 4096
 """Segments a step on an accelerator: with 20 000 points their pairs take .7 GB in double precision."""
 
 
-class Segments(NamedTuple):
+class KernelSegments(NamedTuple):
     """S segments: ends (3, S), circulation over 4π (S,) and softening e = |l|² r_c² (S,)."""
 
     start: Array
@@ -33,7 +33,7 @@ class Segments(NamedTuple):
     soft: Array
 
 
-class Settings(NamedTuple):
+class KernelSettings(NamedTuple):
     """exponent: Vatistas n. chained: each segment starts where the last one ended. block: segments a step. products:
     sum the velocity by matrix products (`_by_products`). at_once: sum it in one step instead (`_at_once`).
     """
@@ -58,7 +58,7 @@ class Block(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
+def velocity(settings: KernelSettings, points: Array, segments: KernelSegments) -> Array:
     """Velocity (3, N) at points (3, N)."""
     if settings.at_once:
         return _at_once(settings, points, segments)
@@ -76,7 +76,7 @@ def velocity(settings: Settings, points: Array, segments: Segments) -> Array:
     return jnp.stack(jax.lax.scan(step, _zeros(points), _blocks(segments, settings))[0])
 
 
-def _by_products(settings: Settings, points: Array, segments: Segments) -> Array:
+def _by_products(settings: KernelSettings, points: Array, segments: KernelSegments) -> Array:
     """The same sum as Σ k (w × x − w × s), w = Γ l/4π and s its start: a product of (6, U) with k (U, N) a step.
 
     It takes half the time of rows added one by one, and steps of many segments leave few hand-overs between threads.
@@ -99,7 +99,7 @@ def _by_products(settings: Settings, points: Array, segments: Segments) -> Array
     return jnp.stack(cross(tuple(total[:3]), x)) - total[3:]
 
 
-def _at_once(settings: Settings, points: Array, segments: Segments) -> Array:
+def _at_once(settings: KernelSettings, points: Array, segments: KernelSegments) -> Array:
     """The same sum for an accelerator, in as few steps as memory allows: a scan is a row of small programs there.
 
     Segments go along the lanes, so that neighbours in memory are added up, and one reduction adds all three components.
@@ -119,7 +119,7 @@ def _at_once(settings: Settings, points: Array, segments: Segments) -> Array:
 
 @partial(jax.jit, static_argnums=0)
 def velocity_and_tangent(
-    settings: Settings, points: Array, segments: Segments, points_t: Array, segments_t: Segments
+    settings: KernelSettings, points: Array, segments: KernelSegments, points_t: Array, segments_t: KernelSegments
 ) -> tuple[Array, Array]:
     """Velocity and its directional derivative in one sweep (…_t: tangents), (3, N) each."""
     x, x_t = tuple(points), tuple(points_t)
@@ -149,7 +149,9 @@ def velocity_and_tangent(
 
 
 @partial(jax.jit, static_argnums=0)
-def cotangents(settings: Settings, points: Array, segments: Segments, weight: Array) -> tuple[Array, Segments]:
+def cotangents(
+    settings: KernelSettings, points: Array, segments: KernelSegments, weight: Array
+) -> tuple[Array, KernelSegments]:
     """Derivatives of sum(weight * velocity) with respect to points and segments, in one sweep.
 
     With a = W w·c for the weight w, a pair of unit strength gives its start −ρa l − κ₁a r₁ − k r₂ × w, its end
@@ -182,17 +184,17 @@ def cotangents(settings: Settings, points: Array, segments: Segments, weight: Ar
     return jnp.stack(add(pull, cross(w, turn))), _gather(segments, centre, *sums)
 
 
-def _gather(segments: Segments, centre: Array, first: Array, second: Array, swirl: Array, rho: Array, k_e: Array):
+def _gather(segments: KernelSegments, centre: Array, first: Array, second: Array, swirl: Array, rho: Array, k_e: Array):
     """Cotangents of the segments from their sums over the points."""
     start, end, g = tuple(segments.start - centre), tuple(segments.end - centre), segments.strength
     edge = subtract(end, start)
     r1_w, r2_w = (subtract(tuple(swirl[3:]), cross(r, tuple(swirl[:3]))) for r in (start, end))
     at_start = [-g * (rho * edge[i] + first[i] - start[i] * first[3] + r2_w[i]) for i in range(3)]
     at_end = [g * (rho * edge[i] + second[i] - end[i] * second[3] + r1_w[i]) for i in range(3)]
-    return Segments(jnp.stack(at_start), jnp.stack(at_end), dot(edge, r1_w), -g * k_e)
+    return KernelSegments(jnp.stack(at_start), jnp.stack(at_end), dot(edge, r1_w), -g * k_e)
 
 
-def _even(segments: Segments, most: int) -> int:
+def _even(segments: KernelSegments, most: int) -> int:
     """Segments a step where steps, none of more than `most`, are as equal as can be: what fills the last one up costs
     as much as segments do.
     """
@@ -200,7 +202,7 @@ def _even(segments: Segments, most: int) -> int:
     return -(-count // -(-count // most))
 
 
-def _blocks(segments: Segments, settings: Settings) -> Block:
+def _blocks(segments: KernelSegments, settings: KernelSettings) -> Block:
     """Cut S segments into steps of U, (steps, …, U); the last step is filled up with segments of no length or strength.
 
     They stand where the last segment ends, which keeps a chain a chain.

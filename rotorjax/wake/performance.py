@@ -10,7 +10,7 @@ from rotorjax.wake.equilibrium import Evaluation
 from rotorjax.wake.model import FreeWake
 
 
-class Performance(NamedTuple):
+class Coefficients(NamedTuple):
     """thrust: C_T = T/(ρA(ΩR)²); power: C_P = P/(ρA(ΩR)³) = induced + profile; mean_inflow: over ΩR, area-weighted."""
 
     thrust: Float[Array, ""]
@@ -20,15 +20,15 @@ class Performance(NamedTuple):
     mean_inflow: Float[Array, ""]
 
 
-def performance(model: FreeWake, found: Evaluation) -> Performance:
-    """Performance of the rotor in a wake, mean over its azimuths."""
+def performance(model: FreeWake, found: Evaluation) -> Coefficients:
+    """Coefficients of the rotor in a wake, mean over its azimuths."""
     return performance_in(model, found.velocities.control, found.loads)
 
 
-def performance_in(model: FreeWake, control: Float[Array, "K R 3"], loads: SectionLoads) -> Performance:
-    """Performance from the air's velocity at the control points and the blades' loads in it."""
+def performance_in(model: FreeWake, control: Float[Array, "K R 3"], loads: SectionLoads) -> Coefficients:
+    """Coefficients from the air's velocity at the control points and the blades' loads in it."""
     mean = disk_mean(model, -control[..., 2])
-    return Performance(*rotor_coefficients(model.rotor, loads, model.stations, model.widths), mean)
+    return Coefficients(*rotor_coefficients(model.rotor, loads, model.stations, model.widths), mean)
 
 
 def disk_mean(model: FreeWake, inflow: Float[Array, "K R"]) -> Float[Array, ""]:

@@ -37,7 +37,7 @@ from rotorjax.wake.equilibrium import Evaluation, Unknowns, full_state, transpor
 from rotorjax.wake.field import Velocities, at_instants, from_hub, node_velocities, targets_of, to_hub, wake_segments
 from rotorjax.wake.loads import blade_loads
 from rotorjax.wake.model import FreeWake, WakeState, among_settings, check_surfaces, free_wake
-from rotorjax.wake.performance import Performance, performance
+from rotorjax.wake.performance import Coefficients, performance
 from rotorjax.wake.segments import Segments
 from rotorjax.wake.settings import WakeSettings
 
@@ -339,12 +339,12 @@ def with_collectives(several: SeveralWakes, collective: Float[Array, " N"]) -> S
     return eqx.tree_at(lambda s: s.wakes.operating.collective, several, collective)
 
 
-def loads_of(several: SeveralWakes, found: Evaluation) -> Performance:
+def loads_of(several: SeveralWakes, found: Evaluation) -> Coefficients:
     """Thrust, power and mean inflow of each rotor, arrays (N,)."""
     return eqx.filter_vmap(performance)(several.wakes, found)
 
 
-def velocity(several: SeveralWakes, state: WakeState, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
+def velocity(state: WakeState, points: Float[Array, "P 3"], several: SeveralWakes) -> Float[Array, "P 3"]:
     """Induced velocity over ΩR at points of the common frame (over R), mean over the instants of a blade's passage."""
     segments = eqx.filter_vmap(wake_segments)(several.wakes, state, several.phases)
 

@@ -16,7 +16,7 @@ from rotorjax.wake.dynamics import carried_on, inputs_of
 from rotorjax.wake.field import Velocities
 from rotorjax.wake.lifting_line import bound_line
 from rotorjax.wake.model import Flight, FreeWake, WakeState
-from rotorjax.wake.performance import Performance, performance_in
+from rotorjax.wake.performance import Coefficients, performance_in
 from rotorjax.wake.several import SeveralWakes, velocities_in
 
 
@@ -56,7 +56,7 @@ def at_one_instant(several: SeveralWakes, state: WakeState) -> SeveralState:
 
 def rhs(
     t: float | Float[Array, ""], x: SeveralState, inputs: SeveralInputs, several: SeveralWakes
-) -> tuple[SeveralState, Performance]:
+) -> tuple[SeveralState, Coefficients]:
     """Rate of change of the state per radian of Ω_ref t, and thrust, power and mean inflow of each rotor (N,), over
     ρA(Ω_ref R)², ρA(Ω_ref R)³ and Ω_ref R; the equations do not hold t.
     """
@@ -83,6 +83,6 @@ def _turning(several: SeveralWakes, x: SeveralState, inputs: SeveralInputs) -> S
     return replace(several, wakes=replace(wakes, flight=flight), phases=x.azimuth, slices=blades)
 
 
-def _of_one(model: FreeWake, state: WakeState, velocities: Velocities) -> tuple[WakeState, Performance]:
+def _of_one(model: FreeWake, state: WakeState, velocities: Velocities) -> tuple[WakeState, Coefficients]:
     line = bound_line(model, velocities.control, state, inputs_of(model))
     return carried_on(state, velocities, line.gamma, model), performance_in(model, line.control, line.loads)

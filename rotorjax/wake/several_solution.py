@@ -21,7 +21,7 @@ from rotorjax.ode.outcome import Outcome
 from rotorjax.wake import several as flow
 from rotorjax.wake.equilibrium import METHOD, Evaluation, Unknowns, displacement, spread
 from rotorjax.wake.model import WakeState
-from rotorjax.wake.performance import Performance
+from rotorjax.wake.performance import Coefficients
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.search import MOST_SLICES, Progress
 from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
@@ -87,7 +87,7 @@ class SeveralSolution:
 
     def velocity(self, points: Float[Array, "P 3"]) -> Float[Array, "P 3"]:
         """Induced velocity over ΩR at points of the common frame over R, mean over the blades' passage."""
-        return _velocity(self.model, self.state, jnp.asarray(points, float))
+        return _velocity(self.state, jnp.asarray(points, float), self.model)
 
 
 _velocity = eqx.filter_jit(flow.velocity)
@@ -158,7 +158,7 @@ def _by_shares(
     return _read(_share(several, branch.parameters[-1]), found, spent)
 
 
-def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Performance:
+def performance_of(solution: SeveralSolution, several: SeveralWakes) -> Coefficients:
     """Thrust, power and mean inflow of each rotor (N,), with their derivatives by every number of the model.
 
     The value is the solution's, whatever the model: give the solution's own, or a traced one with its numbers. One

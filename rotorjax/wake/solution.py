@@ -182,7 +182,7 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
     )
 
 
-class OverGround(Protocol):
+class HasClearance(Protocol):
     """What has nodes over ground, or none under it."""
 
     @property
@@ -191,12 +191,12 @@ class OverGround(Protocol):
         ...
 
 
-def told_of(found: OverGround, why: str) -> str:
+def told_of(found: HasClearance, why: str) -> str:
     """Why a search ended where it converged, and what to know of what it found."""
     return why if (under := submerged(found)) is None else f"{why}, but {under}"
 
 
-def submerged(found: OverGround) -> str | None:
+def submerged(found: HasClearance) -> str | None:
     """What to know of a wake that lies under the ground, in one line; None of one that does not."""
     if found.clearance >= 0:
         return None

@@ -149,14 +149,14 @@ ROTOR_INPUTS = {
 
 
 def inputs_of(v):
-    return dynamics.RotorInputs(v[:M], v[M], v[M + 1])
+    return dynamics.InflowInputs(v[:M], v[M], v[M + 1])
 
 
 def window(v):
     psi = jnp.array([0.0, 1.0, 2.5])
     tau = jnp.stack([v[:M], 1.1 * v[:M], 0.9 * v[:M]])
     a = jnp.stack([v[M + 2 :], v[M + 2 :], 1.05 * v[M + 2 :]])
-    return psi, a, dynamics.RotorInputs(tau, jnp.ones(3) * v[M], jnp.ones(3) * v[M + 1])
+    return psi, a, dynamics.InflowInputs(tau, jnp.ones(3) * v[M], jnp.ones(3) * v[M + 1])
 
 
 def axial(v):

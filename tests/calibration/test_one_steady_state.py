@@ -7,7 +7,7 @@ import pytest
 from rotorjax.bench.finite_state import Stations, evaluate
 from rotorjax.calibration.calibration_file import Calibration
 from rotorjax.ground import plane
-from rotorjax.potential.dynamics import RotorInputs, rhs
+from rotorjax.potential.dynamics import InflowInputs, rhs
 from rotorjax.potential.ground_source import DiskQuadrature
 from rotorjax.potential.model import finite_state_model, mean_inflow, steady_state
 from rotorjax.region import half_plane
@@ -39,6 +39,6 @@ def test_the_study_sees_the_ground_disk_and_the_climb():
 @pytest.mark.parametrize("climb", [0.0, 0.02])
 def test_the_steady_state_stays_where_it_is(climb):
     model = finite_state_model(plane(1.0), region=half_plane(0.0), ground_harmonics=2, radial_terms=1, quadrature=SMALL)
-    tau, inputs = TAU[:1], RotorInputs(TAU[:1], jnp.zeros(()), jnp.asarray(climb))
+    tau, inputs = TAU[:1], InflowInputs(TAU[:1], jnp.zeros(()), jnp.asarray(climb))
     state = steady_state(model, tau, climb)
     assert float(jnp.abs(rhs(jnp.zeros(()), state, inputs, model).a).max()) < 1e-14

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from rotorjax.deck.blades import Blades, linear_blades, stations
 from rotorjax.deck.march import simulate
-from rotorjax.deck.over_ground import RotorState, controls, output, over_ground, rhs, trim
+from rotorjax.deck.over_ground import DiskState, controls, output, over_ground, rhs, trim
 from rotorjax.deck.state_space import heave_response, state_space
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
@@ -224,7 +224,7 @@ def test_step_of_collective_against_carpenter_and_fridovich(degrees, ratio):
     model = over_ground(free.rotor, free.table, UniformlyAccelerating(), at=stations(0.0, 24, 1))
     now = controls(still(plane(60.0)), model.rotor, theta)
     many = jax.tree.map(lambda v: jnp.broadcast_to(v, (1201, *v.shape)), now)
-    at_rest_ = RotorState(jnp.zeros(4), jnp.zeros((0, 4)), jnp.zeros(0), jnp.zeros(0))
+    at_rest_ = DiskState(jnp.zeros(4), jnp.zeros((0, 4)), jnp.zeros(0), jnp.zeros(0))
     exact = solve_ivp(
         lambda _, lam: (0.0423 * 5.73 / 2 * (theta / 3 - lam / 2) - 2 * lam**2) / 0.849, (0, 60), [0.0], t_eval=psi
     ).y[0]

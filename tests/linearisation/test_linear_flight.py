@@ -24,7 +24,7 @@ from rotorjax.linearisation.found import Wanted
 from rotorjax.linearisation.hover import Flat, products
 from rotorjax.linearisation.instant import MOTIONS, instant
 from rotorjax.linearisation.memory import give_back
-from rotorjax.linearisation.modes import Mode
+from rotorjax.linearisation.modes import RotorMode
 from rotorjax.linearisation.rotor import Base, SteadyState, rates
 from rotorjax.linearisation.settled import mirrored, settled
 from rotorjax.ode.harmonic import average
@@ -172,8 +172,8 @@ def test_several_flights_make_one_scheduled_model(one, other):
     none, flights = np.zeros((len(OUTPUTS), len(INPUTS))), []
     for advance, part in ((0.1, one), (0.2, other)):
         asked = SimpleNamespace(request=request("uh60", 0.00575, "freewake", advance=advance))
-        wake = wake_flight.InWake(0, 0, (), 0.0, none, none, 0.0, part.basis)
-        full, named = average(part.model), (Mode("coning", -0.5 + advance * 1j, {}, {}),)
+        wake = wake_flight.WakeFindings(0, 0, (), 0.0, none, none, 0.0, part.basis)
+        full, named = average(part.model), (RotorMode("coning", -0.5 + advance * 1j, {}, {}),)
         flights.append(flight.LinearFlight(asked, full, None, named, {}, part.model, (0,), none, none, none, wake))
     data = schedule.stitched(flights, "azimuth")
     assert list(data.advance_ratio.values) == [0.1, 0.2]
@@ -187,7 +187,7 @@ def test_several_flights_make_one_scheduled_model(one, other):
     assert alone.axes[0].get_legend().get_texts()[0].get_text() == "advance ratio 0.1"
     assert [*schedule.pictures(high)] == ["roots_height_1", "roots_height_2"]
     np.testing.assert_allclose(data.frequency.sel(mode="coning"), [0.1, 0.2])
-    wake = Mode("wake collective", -0.2 + 1j, {}, {})  # others in every flight: no line goes from one to the next
+    wake = RotorMode("wake collective", -0.2 + 1j, {}, {})  # others in every flight: no line goes from one to the next
     (drawn,) = schedule.pictures([replace(one, modes=(*one.modes, wake)) for one in flights]).values()
     assert sum(line.get_marker() == "None" for line in drawn.axes[0].lines) == 2  # coning, and zero growth
     for k, found in enumerate(flights):
@@ -203,10 +203,10 @@ def test_a_flight_in_the_wake_is_kept_and_taken_up(one, tmp_path, monkeypatch):
     means = Means(0.00575, 4e-4, 2e-4, 1e-4, 0.0, 0.0, *np.arange(12.0).reshape(4, 3))
     result = Result(asked, trimmed, means, Verdict("converged", "made up", 1e-4, 1e-3, 0.25), 1.5)
     step, condensation = np.random.default_rng(0).normal(size=(2, *one.model.d.shape[1:]))
-    mode = Mode("wake collective", -0.2 + 1j, {"flap": 0.1, "inflow": 0.9}, {"wake[0]": 0.5})
-    wake = wake_flight.InWake(304, 48, (mode,), 1e-5, step, condensation, np.nan, one.basis)
+    mode = RotorMode("wake collective", -0.2 + 1j, {"flap": 0.1, "inflow": 0.9}, {"wake[0]": 0.5})
+    wake = wake_flight.WakeFindings(304, 48, (mode,), 1e-5, step, condensation, np.nan, one.basis)
     parts, nothing = (one.model, (0,), None, None, step, wake), (None, None)
-    shelf, heard = kept.Shelf(tmp_path, Wanted(INPUTS, OUTPUTS), []), {}
+    shelf, heard = kept.FlightShelf(tmp_path, Wanted(INPUTS, OUTPUTS), []), {}
     assert shelf.take_up(asked) is None
     shelf.keep(flight.LinearFlight(result, *nothing, (replace(mode, name="coning"), mode), {"trim": 2.0}, *parts))
     monkeypatch.setattr(kept, "restored", lambda *of: heard.update(restored=of) or trimmed)

@@ -16,7 +16,7 @@ from rotorjax.linearisation.marching import STEPS, nonlinear_step, stable_steps
 from rotorjax.linearisation.outputs import read
 from rotorjax.linearisation.reduce import reduce
 from rotorjax.linearisation.system import (
-    Base,
+    WakeBase,
     disturbed_outputs,
     disturbed_rhs,
     linear_wake,
@@ -188,7 +188,7 @@ def test_unknown_names_and_lost_wakes_are_refused(wake):
 def test_slices_are_interpolated_to_themselves_and_turn_from_blade_to_blade(wake):
     rng = np.random.default_rng(2)
     periodic = jax.tree.map(lambda a: jnp.asarray(rng.normal(size=(8, *a.shape[1:]))), wake.state)
-    base = Base(periodic, wake.model)
+    base = WakeBase(periodic, wake.model)
     for leaf, now, later in zip(
         *map(jax.tree.leaves, (periodic, base.at(jnp.pi / 4), base.at(3 * jnp.pi / 4))), strict=True
     ):
@@ -200,7 +200,7 @@ def test_a_level_wake_taken_for_one_over_a_slope_has_the_same_model(wake, model)
     """The way of slopes (all blades, interpolated slices, disturbances alike) on a case whose answer is known."""
     state = spread(jax.tree.map(jnp.asarray, wake.state), 8)
     slices, rng = replace(wake, state=state, psi=np.arange(8) * np.pi / 4), np.random.default_rng(4)
-    orbit, base, u = orbit_of(slices, nodes=2), Base(state, wake.model), inputs_of(wake.model)
+    orbit, base, u = orbit_of(slices, nodes=2), WakeBase(state, wake.model), inputs_of(wake.model)
     assert float(orbit.period) == pytest.approx(np.pi / 2)
     x, state_of = ravel_pytree(orbit.start)
     v, w = rng.normal(size=x.size), rng.normal(size=3)

@@ -9,7 +9,7 @@ from derivatives import both_ways
 from rotorjax.errors import InputError
 from rotorjax.ground import plane
 from rotorjax.potential.dynamics import (
-    RotorInputs,
+    InflowInputs,
     axial_velocity,
     costates,
     flow_matrices,
@@ -74,7 +74,7 @@ def test_equilibrium_in_hover_is_the_steady_model(mass_flow, skewed, even_terms)
 def test_mass_flow_in_forward_flight():
     model = cylinder_model(harmonics=1, radial_terms=2)
     a = jnp.zeros(6).at[0].set(0.03)
-    inputs = RotorInputs(jnp.zeros(6), jnp.array(0.15), jnp.array(0.01))
+    inputs = InflowInputs(jnp.zeros(6), jnp.array(0.15), jnp.array(0.01))
     v, inverse = flow_matrices(a, inputs, model)
     induced = 2 / np.sqrt(3) * float((inverse @ a)[0])
     through = 0.01 + induced
@@ -133,7 +133,7 @@ def oscillation(model, omega):
     response = np.linalg.solve(1j * omega * mass + d, d[:, 0]) * 1e-7
     a = jnp.array((np.exp(1j * omega * np.array(WINDOW))[:, None] * response).imag)
     tau = jnp.zeros_like(a).at[:, 0].set(1e-7 * jnp.sin(omega * WINDOW))
-    inputs = RotorInputs(tau, jnp.zeros_like(WINDOW), jnp.ones_like(WINDOW))
+    inputs = InflowInputs(tau, jnp.zeros_like(WINDOW), jnp.ones_like(WINDOW))
     return a, costates(WINDOW, a, inputs, model, skewed=False)
 
 
@@ -187,7 +187,7 @@ def test_skewed_steady_flow_below_the_disk_against_the_exact_one():
         model = cylinder_model(harmonics=harmonics, radial_terms=terms, mass_flow="linear")
         count = len(model.modes)
         tau = jnp.zeros(count).at[0].set(1e-7)
-        inputs = RotorInputs(jnp.zeros((2, count)) + tau, jnp.full(2, np.sin(chi)), jnp.full(2, np.cos(chi)))
+        inputs = InflowInputs(jnp.zeros((2, count)) + tau, jnp.full(2, np.sin(chi)), jnp.full(2, np.cos(chi)))
         l = influence(model.modes, model.modes, jnp.array(np.tan(chi / 2)))
         mass = jnp.array(apparent_mass(model.modes, model.modes))
         a = jnp.broadcast_to(jnp.linalg.solve(mass, l @ tau), (2, count))
@@ -236,7 +236,7 @@ def test_derivative_ladder(mu):
 
     @jax.jit
     def f(v):
-        inputs = RotorInputs(v[6:12], v[12], v[13])
+        inputs = InflowInputs(v[6:12], v[12], v[13])
         return rhs(jnp.array(0.0), with_ground(v[:6], model), inputs, model).a
 
     v = jnp.concatenate([jnp.linspace(0.05, 0.01, 6), tau, jnp.array([mu, 0.01])])

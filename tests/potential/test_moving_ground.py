@@ -7,7 +7,7 @@ from derivatives import both_ways
 
 from rotorjax.errors import InputError
 from rotorjax.ground import Plane, plane
-from rotorjax.potential.dynamics import RotorInputs, hover_inputs
+from rotorjax.potential.dynamics import InflowInputs, hover_inputs
 from rotorjax.potential.ground_source import self_flow
 from rotorjax.potential.model import finite_state_model, steady_state
 from rotorjax.potential.moving_ground import (
@@ -114,7 +114,7 @@ def test_derivative_ladder():
 
     @jax.jit
     def f(v):
-        now, inputs = GroundMotion(v[0], v[1], v[2], v[3]), RotorInputs(jnp.zeros(6), v[4], v[5])
+        now, inputs = GroundMotion(v[0], v[1], v[2], v[3]), InflowInputs(jnp.zeros(6), v[4], v[5])
         wake = v[6] * jnp.cos(jnp.arange(12.0))[:, None] * jnp.ones(6)
         return ground_states(v[6] * jnp.ones(6), now, inputs, model, "dynamic", TRANSPORT, wake)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.potential.dynamics import RotorInputs, costates, hover_inputs
+from rotorjax.potential.dynamics import InflowInputs, costates, hover_inputs
 from rotorjax.potential.field import field_functions, pressure_functions
 from rotorjax.potential.matrices import apparent_mass, damping
 from rotorjax.potential.model import finite_state_model, steady_state
@@ -78,7 +78,7 @@ def test_both_components_against_integration_along_streamlines(omega):
         response = np.linalg.solve(1j * omega * mass + d, d[:, 0]) * 1e-7
         a = jnp.array((np.exp(1j * omega * np.array(psi))[:, None] * response).imag)
         tau = jnp.zeros_like(a).at[:, 0].set(1e-7 * jnp.sin(omega * psi))
-        delta = costates(psi, a, RotorInputs(tau, jnp.zeros_like(psi), jnp.ones_like(psi)), model, skewed=False)
+        delta = costates(psi, a, InflowInputs(tau, jnp.zeros_like(psi), jnp.ones_like(psi)), model, skewed=False)
         mine = velocity_at(jnp.array(time), points, psi, a, delta, jnp.array(1.0), model) * 1e7
         errors.append(np.abs(mine - exact).max(axis=0)[[0, 2]])
     assert np.all(errors[2] < errors[0])

@@ -16,7 +16,7 @@ from rotorjax.cli import main
 from rotorjax.errors import ArgumentError, InputError
 from rotorjax.io import netcdf
 from rotorjax.sweep.case import sweep_case
-from rotorjax.sweep.found import Found, Start, from_best, judged
+from rotorjax.sweep.found import Found, Neighbour, from_best, judged
 from rotorjax.sweep.pools import Cluster, Processes, packed, unpacked
 from tests.browser import opens
 
@@ -138,7 +138,7 @@ def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
 
 def test_a_lost_start_is_tried_from_nothing():
     good = {"CT": 1.0, "CP": 2.0, "lambda_0": 3.0}
-    start = Start(None, judged(good, {"a": np.ones(1)}, True, True, 0.0, ""))
+    start = Neighbour(None, judged(good, {"a": np.ones(1)}, True, True, 0.0, ""))
 
     def solver(near: Found):
         return lambda prepared, begin, progress: near if begin else judged({**good, "CT": 1.1}, {}, True, True, 0, "")

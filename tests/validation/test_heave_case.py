@@ -66,7 +66,7 @@ def test_rows_of_equal_models_are_met_and_of_others_are_not():
 def test_picture():
     one, at = made_up(), heave.points(Subject())
     models, quarter = [Each(one, made_up(gain=0.5), one)] * 2, np.zeros((heaving.instants().size, 2))
-    assert len(heave.draw(at, models, heave.March(quarter, quarter, quarter)).axes) == 8
+    assert len(heave.draw(at, models, heave.HeaveChanges(quarter, quarter, quarter)).axes) == 8
 
 
 def test_finite_states_at_rest_follow_the_steady_ground_effect():
@@ -111,4 +111,4 @@ def test_march_and_linear_wake_speak_of_the_same_heave(monkeypatch):
     np.testing.assert_allclose(linear, true.history(heave_), atol=1e-12)
     marched = heaving.marched(solution, heave_)
     np.testing.assert_allclose(marched, linear, atol=1e-8)
-    assert heave.march_row(heave.points(Subject())[-1], heave.March(marched, linear, linear)).met
+    assert heave.march_row(heave.points(Subject())[-1], heave.HeaveChanges(marched, linear, linear)).met

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
-from rotorjax.linearisation.waves import Mode, pairing
+from rotorjax.linearisation.waves import WaveMode, pairing
 from rotorjax.validation.disturbance import Disturbed, Fastest, disturbed, left_vector
 from rotorjax.wake.solution import solve
 
@@ -37,7 +37,7 @@ def test_a_small_disturbance_of_the_march_is_as_much_larger_as_it_starts_larger(
     """The nonlinear march of both blades' wakes from rest: linear in what it starts with, whatever it is read with."""
     rest = solve(coarse_hover.model, coarse_hover, tol=1e-11)  # what is left of a residual of 1e-7 would move off too
     left = np.random.default_rng(2).normal(size=ravel_pytree(rest.state)[0].size) + 0j
-    along = Fastest(Mode(1, 0.3 + 0j, 0.0), left, 250.0, pairing(rest))
+    along = Fastest(WaveMode(1, 0.3 + 0j, 0.0), left, 250.0, pairing(rest))
     one, two = (disturbed(rest, along, size, 0.25, samples=8, progress=False) for size in (1e-6, 2e-6))
     np.testing.assert_allclose(one.psi, np.linspace(0, np.pi / 2, 3))
     assert one.total[0] == pytest.approx(1e-6, rel=0.05)

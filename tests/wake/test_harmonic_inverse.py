@@ -13,7 +13,7 @@ from rotorjax.wake import preconditioner
 from rotorjax.wake.biot_savart import segment_velocity
 from rotorjax.wake.equilibrium import residual, spread
 from rotorjax.wake.influence import pair_derivatives
-from rotorjax.wake.kernel_sweeps import Segments
+from rotorjax.wake.kernel_sweeps import KernelSegments
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.preconditioner import harmonic_inverse
 from rotorjax.wake.settings import wake_settings
@@ -31,7 +31,7 @@ def test_pair_derivatives_are_those_of_the_kernel():
         return jax.vmap(one, out_axes=1)(start, end, strength, core)
 
     soft = jnp.sum((end - start) ** 2, axis=1) * core**2
-    segments = Segments(start.T, end.T, strength / (4 * jnp.pi), soft)
+    segments = KernelSegments(start.T, end.T, strength / (4 * jnp.pi), soft)
     found = pair_derivatives(points, segments)
     tangents = [jnp.asarray(rng.normal(size=a.shape)) for a in (start, end, strength, core)]
     expected = jax.jvp(each, (start, end, strength, core), tuple(tangents))[1]

@@ -50,10 +50,10 @@ def test_rotors_side_by_side_are_mirror_images(uh60, alone):
     np.testing.assert_allclose(left, right, atol=1e-13)
     points = np.random.default_rng(0).uniform(-1.5, 1.5, (6, 3)) - [0, 0, 0.4]
     flow = eqx.filter_jit(velocity)
-    here, there = (np.asarray(flow(pair, of_each(alone, pair), jnp.asarray(p))) for p in (points, points * [1, -1, 1]))
+    here, there = (np.asarray(flow(of_each(alone, pair), jnp.asarray(p), pair)) for p in (points, points * [1, -1, 1]))
     np.testing.assert_allclose(here, there * [1, -1, 1], atol=1e-13)
     ground = np.column_stack([points[:, :2], np.full(6, -2.0)])
-    np.testing.assert_allclose(flow(pair, of_each(alone, pair), jnp.asarray(ground))[:, 2], 0, atol=1e-14)
+    np.testing.assert_allclose(flow(of_each(alone, pair), jnp.asarray(ground), pair)[:, 2], 0, atol=1e-14)
 
 
 def test_rotors_far_apart_leave_each_other_alone(uh60, alone):
@@ -99,7 +99,7 @@ def test_a_pair_beside_a_wall_is_mirrored_and_blows_none_through_it(uh60, alone)
     np.testing.assert_allclose(left, right, atol=1e-12)
     near = wall.middles + 0.005 * wall.normals
     flow = eqx.filter_jit(velocity)
-    blown, kept = (jnp.sum(flow(m, states, near) * wall.normals, axis=1) for m in (bare, pair))
+    blown, kept = (jnp.sum(flow(states, near, m) * wall.normals, axis=1) for m in (bare, pair))
     assert float(jnp.abs(blown).max()) > 1e-3
     assert float(jnp.abs(kept).max()) < 0.05 * float(jnp.abs(blown).max())
 
@@ -199,9 +199,9 @@ def test_a_rotor_that_leans_stands_over_a_slope(uh60, alone):
     points = np.random.default_rng(1).uniform(-0.8, 0.8, (6, 3)) - [0, 0, 0.3]
     wanted = field.velocity(jax.tree.map(lambda a: a[0], states), jnp.asarray(points), model).mean(axis=0)
     flow = eqx.filter_jit(velocity)
-    np.testing.assert_allclose(flow(leaning, states, jnp.asarray(points @ own.T)) @ own, wanted, atol=1e-12)
+    np.testing.assert_allclose(flow(states, jnp.asarray(points @ own.T), leaning) @ own, wanted, atol=1e-12)
     ground = jnp.asarray(np.column_stack([points[:, :2], np.full(6, -height)]))
-    np.testing.assert_allclose(flow(leaning, states, ground)[:, 2], 0, atol=1e-14)
+    np.testing.assert_allclose(flow(states, ground, leaning)[:, 2], 0, atol=1e-14)
 
 
 def test_a_pair_that_leans_apart_is_its_own_mirror_image(uh60, alone):
