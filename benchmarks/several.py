@@ -3,7 +3,8 @@
 Parts: quadrotor (one periodic hover at h = 1, hubs 2.5 R apart: seconds from an empty process, residual, the air that
 comes up in the middle), heights (thrust at one collective over height, of the single rotor, of two side by side and of
 four), edge (two rotors, one over a deck, one beside it), march (the four marched from their periodic wake, for a
-revolution as they are and then with diagonal pairs 3 % faster and slower: a yaw command). Knight and Hefner's
+revolution as they are and then with diagonal pairs 3 % faster and slower: a yaw command), linear (the four linearised,
+and steps of yaw and of all collectives beside the nonlinear march, over a revolution). Knight and Hefner's
 two-bladed rotor at 8°, senses alternating; the wakes of `SETTINGS` keep all to minutes, `--default` takes those of
 `rj.several_wakes`.
 
@@ -22,6 +23,7 @@ import numpy as np
 import rotorjax as rj
 from rotorjax.bench.plotting import legend_below, new_figure, save_file, style
 from rotorjax.io.atomic import json_text
+from rotorjax.linearisation.several import PHASES, about
 
 jax.config.update("jax_enable_x64", True)
 BEGAN = time.perf_counter()
@@ -33,6 +35,10 @@ SINGLE = [(0.0, 0.0, 0.0)]
 PAIR = [(0.0, -HALF, 0.0), (0.0, HALF, 0.0)]
 QUAD = [(-HALF, -HALF, 0.0), (-HALF, HALF, 0.0), (HALF, HALF, 0.0), (HALF, -HALF, 0.0)]
 YAW = 0.03
+STEPS = {
+    "yaw: diagonal pairs 0.2 % faster and slower": ("omega", 0.002 * np.array([1, -1, 1, -1])),
+    "all collectives up by 0.05°": ("theta_0", np.full(4, np.deg2rad(0.05))),
+}
 HEIGHTS = (3.0, 2.0, 1.5, 1.0, 0.75)
 
 
@@ -176,7 +182,63 @@ def draw_march(found, turn: int, solved, path: Path) -> None:
     save_file(figure, path)
 
 
-PARTS = {"quadrotor": quadrotor, "heights": heights, "edge": edge, "march": march}
+def linear(settings, out: Path | None) -> dict:
+    """Thrust, torque and inflow after small steps: of the linear model and of the march, a mean over its phases."""
+    solved = rj.solve(rotors(QUAD, 1.0, settings))
+    began = time.perf_counter()
+    model = rj.linearise(solved)
+    row = {"converged": solved.converged, "linearise_seconds": time.perf_counter() - began, "order": model.order}
+    row |= {"step_error": model.notes["step_error"], "largest_growth": float(model.poles().real.max())}
+    marched = rj.march(solved, precision="double")
+    commands = {name: dict.fromkeys(("theta_0", "omega"), np.zeros(4)) for name in STEPS}
+    for name, (of, size) in STEPS.items():
+        commands[name] |= {of: size}
+    rest = responses(marched, solved, dict.fromkeys(("theta_0", "omega"), np.zeros(4)))
+    times = 2 * np.pi / marched.steps_per_turn * np.arange(len(rest))
+    found = {}
+    for name, change in commands.items():
+        truth = responses(marched, solved, change) - rest
+        ours = model.step(times) @ np.concatenate([change["theta_0"], change["omega"]])
+        found[name] = truth, ours.reshape(truth.shape)
+        gap = np.abs(truth - found[name][1]).max(axis=(0, 2)) / np.abs(truth).max(axis=(0, 2))
+        row |= {name: dict(zip(("CT", "CQ", "inflow"), gap.tolist(), strict=True))}
+    print(json_text({"linear": row}), flush=True)
+    if out is not None:
+        draw_linear(times, found, out / "linear.png")
+    return row
+
+
+def responses(marched, solved, change) -> np.ndarray:
+    """Outputs (steps, kinds, rotors) over a revolution, a mean over starts half a blade's passage apart."""
+    rows = []
+    inputs = replace(marched.inputs, **{name: getattr(marched.inputs, name) + size for name, size in change.items()})
+    for began in np.pi * np.arange(PHASES) / PHASES:  # two blades
+        state = replace(marched.start, x=about(solved.model, solved.found.state, jnp.asarray(began)))
+        row = []
+        for _ in range(marched.steps_per_turn + 1):
+            state = marched.step(state, inputs)
+            row.append([state.y.thrust, state.y.power / inputs.omega, state.y.mean_inflow])
+        rows.append(row)
+    return np.mean(rows, axis=0)
+
+
+def draw_linear(times, found, path: Path) -> None:
+    """Of a rotor of each diagonal, C_T and C_Q after both commands: the march as lines, the linear model dashed."""
+    with style():
+        figure = new_figure(9.0, 5.4)
+        for j, (name, (truth, ours)) in enumerate(found.items()):
+            for k, of in enumerate(("C_T", "C_Q")):
+                axes = figure.add_subplot(2, 2, 2 * j + k + 1)
+                for i, (x, y, _) in enumerate(QUAD[:2]):
+                    where = f"{'aft' if x > 0 else 'fore'}, {'starboard' if y > 0 else 'port'}"
+                    axes.plot(times / 2 / np.pi, truth[:, k, i], label=f"{where}: march")
+                    axes.plot(times / 2 / np.pi, ours[:, k, i], "k--", lw=1.2, label="linear model" if i else None)
+                axes.set(xlabel="revolutions", ylabel=f"change of ${of}$", title=name)
+        legend_below(figure.axes[0], 3)
+    save_file(figure, path)
+
+
+PARTS = {"quadrotor": quadrotor, "heights": heights, "edge": edge, "march": march, "linear": linear}
 
 
 def main() -> None:

@@ -61,11 +61,6 @@ class Found:
         """Whether the point converged."""
         return self.verdict == CONVERGED
 
-    @property
-    def rank(self) -> int:
-        """Converged before stalled before none."""
-        return 2 if self.solved else 1 if self.verdict.startswith(STALLED) else 0
-
 
 def refused(why: str) -> Found:
     """No solution, with its reason in one line."""
@@ -110,26 +105,6 @@ class PointSolver(Protocol):
     ) -> list[Found]:
         """What is found at each."""
         ...
-
-
-def from_best(
-    solve: Callable[[Any, Neighbour | None, Progress | None], Found],
-    prepared: Any,
-    start: Neighbour | None,
-    progress: Progress | None,
-) -> Found:
-    """Solve from a neighbour; where that fails, or gives the neighbour's own numbers back, from nothing."""
-    near = None if start is None else solve(prepared, start, progress)
-    if near is not None and start is not None and near.solved and not same_numbers(near, start.found):
-        return near
-    fresh = solve(prepared, None, progress)
-    return near if near is not None and not near.solved and near.rank > fresh.rank else fresh
-
-
-def same_numbers(one: Found, other: Found) -> bool:
-    """Whether thrust, power and inflow agree to rounding, as no two points' do."""
-    names = ("CT", "CP", "lambda_0")
-    return all(math.isclose(one.values[n], other.values[n], rel_tol=1e-12) for n in names)
 
 
 def dimensional(CT: float, CP: float, rotor: Any, operating: Any) -> dict[str, float]:

@@ -13,7 +13,7 @@ from rotorjax.bench.single import check_case
 from rotorjax.bench.wake_file import lost_at, model_of, start_of, state_arrays, to_dataset
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import DesignPoint
-from rotorjax.sweep.found import Found, Neighbour, Progress, from_best, judged, of_hover
+from rotorjax.sweep.found import Found, Neighbour, Progress, judged, of_hover
 from rotorjax.sweep.rotors import rotor_of, values_of
 from rotorjax.wake.solution import solve as solve_wake
 
@@ -50,11 +50,7 @@ def solve(
     solver: WakeSolver = solve_wake,
 ) -> list[Found]:
     """Solve hovers one after the other from the same start."""
-
-    def one(wanted: WakeHover, near: Neighbour | None, show: Progress | None) -> Found:
-        return _solve(wanted, near, show, solver)
-
-    return [from_best(one, wanted, start, progress) for wanted in prepared]
+    return [_solve(wanted, start, progress, solver) for wanted in prepared]
 
 
 def _solve(wanted: WakeHover, near: Neighbour | None, progress: Progress | None, solver: WakeSolver) -> Found:

@@ -111,13 +111,25 @@ def solve(
 ) -> Solution:
     """Find the periodic wake of a model, from a prescribed wake or from the solution of a neighbouring case.
 
-    start: a solution with the same rotor and settings; used where both have ground, or neither. progress(stage,
-    residual) is called after each continuation step. tol: relative rms of the residual. A solve that does not get there
-    comes back with `converged` False, the reason, and the last good state.
+    start: a solution with the same rotor and settings; used where both have ground, or neither. Where the way from it
+    is lost, the one from nothing is tried. progress(stage, residual) is called after each continuation step. tol:
+    relative rms of the residual. A solve that does not get there comes back with `converged` False, the reason, and the
+    last good state.
     """
-    clock = Clock()
-    search = Search(tol, progress)
-    if start is None or not start.converged or not _fits(start, model):
+    clock, search = Clock(), Search(tol, progress)
+    near = start if start is not None and start.converged and _fits(start, model) else None
+    here, x = _way(model, near, search)
+    if near is not None and not search.ok and not search.interrupted:
+        again = Search(tol, progress, iterations=search.iterations)
+        there, y = _way(model, None, again)
+        if again.ok or again.interrupted:
+            here, x, search = there, y, again
+    return read(here, x, search, clock)
+
+
+def _way(model: FreeWake, start: Solution | None, search: Search) -> tuple[FreeWake, Unknowns]:
+    """Where a search for a model's wake ends, from a neighbour or from nothing."""
+    if start is None:
         here, x = search.from_nothing(on_host(model.levelled))
     else:
         # the static choices are the model's own (azimuths may differ), the numbers the start's
@@ -133,7 +145,7 @@ def solve(
             here, x = search.among(model, x)
         else:
             here, x = search.move(here, model, x, "to the case")
-    return read(here, x, search, clock)
+    return here, x
 
 
 def rehearse(model: FreeWake) -> Solution:

@@ -73,7 +73,7 @@ def test_trims_are_what_they_are_one_by_one(tmp_path):
     assert float(found["CP"].min()) < float(found["CP"].sel(advance_ratio=0.0))
 
 
-def test_a_free_wake_starts_from_its_neighbours_and_a_lost_one_from_nothing(tmp_path):
+def test_a_free_wake_starts_from_its_neighbours(tmp_path):
     wanted = {"height": [1.0, 1.5, 2.0], "slope_deg": [0.0, 10.0]}
     case = sweep_case("inflow", wanted, wake=COARSE, model="freewake", collective_deg=16.0)
     seen = []
@@ -82,12 +82,12 @@ def test_a_free_wake_starts_from_its_neighbours_and_a_lost_one_from_nothing(tmp_
         ground = model.ground
         place = float(ground.height), round(float(np.rad2deg(ground.slope)), 6)
         seen.append((place, None if start is None else float(start.model.ground.height)))
-        return made_up_wake(model, start, progress, converged=start is None or place != (1.0, 0.0))
+        return made_up_wake(model, start, progress, converged=True)
 
     found = dataset(sweep(case, tmp_path, solver=partial(hover_wake.solve, solver=solver)))
     assert seen[0] == ((2.0, 0.0), None)
     at_one = [start for place, start in seen if place == (1.0, 0.0)]
-    assert at_one == [1.5, None]  # lost from the neighbour, found from nothing
+    assert at_one == [1.5]  # where it is lost from there, the solve itself tries from nothing
     assert set(found["verdict"].to_numpy().ravel()) == {"converged"}
     again = []
     sweep(case, tmp_path, solver=lambda *a: again.append(a))

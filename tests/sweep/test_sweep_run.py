@@ -16,7 +16,6 @@ from rotorjax.cli import main
 from rotorjax.errors import ArgumentError, InputError
 from rotorjax.io import netcdf
 from rotorjax.sweep.case import sweep_case
-from rotorjax.sweep.found import Found, Neighbour, from_best, judged
 from rotorjax.sweep.pools import Cluster, Processes, packed, unpacked
 from tests.browser import opens
 
@@ -134,19 +133,6 @@ def test_an_interrupt_says_what_is_kept(tmp_path, monkeypatch, capsys):
     (tmp_path / "case.toml").write_text('[case]\ncommand="trim"\nweight=5e4\n[axes]\nspeed=[0.0, 10.0]\n')
     assert main(["sweep", "--case", str(tmp_path / "case.toml"), "--out", str(tmp_path / "out")]) == 130
     assert "interrupted; finished points are kept, and the same command continues" in capsys.readouterr().err
-
-
-def test_a_lost_start_is_tried_from_nothing():
-    good = {"CT": 1.0, "CP": 2.0, "lambda_0": 3.0}
-    start = Neighbour(None, judged(good, {"a": np.ones(1)}, True, True, 0.0, ""))
-
-    def solver(near: Found):
-        return lambda prepared, begin, progress: near if begin else judged({**good, "CT": 1.1}, {}, True, True, 0, "")
-
-    moved = judged({**good, "CT": 1.2}, {}, True, True, 0.0, "")
-    assert from_best(solver(moved), None, start, None) is moved
-    for suspicious in (start.found, judged(good, {}, False, True, 1e-3, "lost"), judged({}, {}, False, False, 0.0, "")):
-        assert from_best(solver(suspicious), None, start, None).values["CT"] == 1.1
 
 
 KILLED = f"""

@@ -87,7 +87,7 @@ def test_the_grids_wakes_differ_in_one_number_and_each_near_the_ground_has_one_t
     for base, finer in pairs:
         assert not base.changes
         assert replace(finer, changes=()) == base
-    assert {base.slope_deg for base, _ in pairs} == {0.0, 10.0, 20.0}
+    assert {base.slope_deg for base, _ in pairs} == {0.0, 10.0, 20.0, 30.0}
     for task in tasks:
         assert (needed(task, tasks) is None) == (task.height is None)
 

@@ -118,3 +118,31 @@ def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover,
     assert not found.converged
     assert found.why
     assert np.all(np.isfinite(found.inflow))
+
+
+def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monkeypatch):
+    """And where that is lost, too, keeps what the neighbour gave."""
+    move, stages = search.Search.move, []
+
+    def lost_first(self, here, there, x, stage):
+        stages.append(stage)
+        self.ok, self.why = len(stages) > 1, "lost"
+        return move(self, here, there, x, stage) if self.ok else (here, x)
+
+    monkeypatch.setattr(search.Search, "move", lost_first)
+    higher = eqx.tree_at(lambda m: m.ground.height, grounded.model, jnp.asarray(1.1))
+    found = solve(higher, start=grounded)
+    assert len(stages) == 2
+    assert found.converged, found.why
+    np.testing.assert_allclose(float(found.model.ground.height), 1.1)
+    assert found.CT < grounded.CT
+
+    def nowhere(self, model):
+        self.ok, self.why = False, "no way from nothing either"
+        return model, grounded.unknowns
+
+    monkeypatch.setattr(search.Search, "from_nothing", nowhere)
+    stages.clear()
+    lost = solve(higher, start=grounded)
+    assert (lost.converged, lost.why) == (False, "lost")
+    assert float(lost.model.ground.height) == 1.0
