@@ -213,7 +213,7 @@ def responses(marched, solved, change) -> np.ndarray:
     rows = []
     inputs = replace(marched.inputs, **{name: getattr(marched.inputs, name) + size for name, size in change.items()})
     for began in np.pi * np.arange(PHASES) / PHASES:  # two blades
-        state = replace(marched.start, x=about(solved.model, solved.found.state, jnp.asarray(began)))
+        state = replace(marched.start, x=about(solved.found.model, solved.found.state, jnp.asarray(began)))
         row = []
         for _ in range(marched.steps_per_turn + 1):
             state = marched.step(state, inputs)
