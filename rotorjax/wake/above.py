@@ -1,10 +1,10 @@
 """Wake nodes that a coarse wake takes through the ground stand for their mirror images above it.
 
-No flow crosses the plane, and no node of a fine wake does. Differences in age and azimuth may carry one past it all the
-same, most easily where the flow turns up a slope. Under the plane the flow of wake and images is the mirror image of
-the flow above, so such a node still moves as its image should; but its vortex would turn the wrong way, and the wake
-would not be one. So vortices lie where the images are, while the node itself goes on through zero, smooth in age. Near
-wakes, a quarter of a turn old, are left where they are.
+No flow crosses the plane, and no node of a fine wake does. Differences over the long steps of old age may carry one
+past it all the same, most easily where the flow turns up a slope. Under the plane the flow of wake and images is the
+mirror image of the flow above, so such a node still moves as its image should; but its vortex would turn the wrong way,
+and the wake would not be one. So vortices lie where the images are, while the node itself goes on through zero, smooth
+in age. Near wakes, a quarter of a turn old, are left where they are.
 """
 
 from dataclasses import replace

@@ -214,7 +214,7 @@ def submerged(found: HasClearance) -> str | None:
         return None
     return (
         f"its lowest node is {-found.clearance:.2g} R under the ground, which no flow crosses, and stands for its "
-        "mirror image: too few nodes; take a smaller `age_step_deg` and more `azimuths`, until little changes"
+        "mirror image: too few nodes; take `stretch` = 1, then a smaller `age_step_deg`, until little changes"
     )
 
 
