@@ -11,6 +11,7 @@ from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.model import FreeWake
+from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution
 
 if TYPE_CHECKING:
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from rotorjax.trim.run import Request, Result
     from rotorjax.wake.performance import Coefficients
     from rotorjax.wake.several_dynamics import SeveralInputs, SeveralState
-
-Progress = Callable[[str, float], None]
 
 
 def trim(

@@ -21,7 +21,7 @@ from rotorjax.potential import model as potential
 from rotorjax.wake import sensitivity
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.several import SeveralWakes
-from rotorjax.wake.solution import Solution, submerged, tip_vortices
+from rotorjax.wake.solution import Number, Solution, submerged, tip_vortices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from rotorjax.api.several import SolvedTogether
     from rotorjax.wake.several_solution import SeveralSolution
-
-Number = Numbers = Any  # of numpy, or of jax under tracing
 
 
 class Performance(NamedTuple):

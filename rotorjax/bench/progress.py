@@ -10,7 +10,7 @@ from tqdm import tqdm
 EVERY = 20.0  # s between lines in a file
 
 
-class Progress:
+class ProgressLine:
     """Counts what is done of `total`, shows a stage, and says when it will be over; on stderr unless told otherwise."""
 
     def __init__(self, what: str, total: int, unit: str = "point", stream: TextIO | None = None) -> None:
@@ -22,7 +22,7 @@ class Progress:
         if self._stream.isatty():
             self._bar = tqdm(desc=what, total=total, unit=unit, file=self._stream, leave=False)
 
-    def __enter__(self) -> "Progress":
+    def __enter__(self) -> "ProgressLine":
         """Begin a block."""
         return self
 

@@ -1,7 +1,6 @@
 """One case with the VPBFSM, the free wake or both, as `rotorjax inflow` asks for it."""
 
 import time
-from collections.abc import Callable
 from typing import Literal, Protocol
 
 import jax
@@ -15,9 +14,8 @@ from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
 from rotorjax.limits import check_axial, check_place
 from rotorjax.wake.model import FreeWake
+from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution, solve
-
-Progress = Callable[[str, float], None]
 
 
 class Solver(Protocol):

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares, minimize
 from rotorjax.calibration.parameters import ParameterSet
 
 Residual = Callable[[Float[Array, " P"], Any], Float[Array, " N"]]
-Progress = Callable[[int, float], None]
+FitProgress = Callable[[int, float], None]
 Method = Literal["least_squares", "lbfgs", "adam"]
 
 _ADAM_STEP = 0.1
@@ -45,7 +45,7 @@ class Descent:
     history: rms at the start and after every step. compile_time_s: of the first evaluation.
     """
 
-    def __init__(self, residual: Residual, parameters: ParameterSet, data: Any, progress: Progress | None = None):
+    def __init__(self, residual: Residual, parameters: ParameterSet, data: Any, progress: FitProgress | None = None):
         """Compiles nothing yet."""
         self.parameters, self.progress = parameters, progress
         self.history: list[float] = []

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import ArrayLike, Float, PyTree
 
-from rotorjax.calibration.drivers import DRIVERS, Descent, Method, Progress, Residual
+from rotorjax.calibration.drivers import DRIVERS, Descent, FitProgress, Method, Residual
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.errors import InputError
 
@@ -89,7 +89,7 @@ def calibrate(
     start: ArrayLike | None = None,
     method: Method = "least_squares",
     max_steps: int | None = None,
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
 ) -> Fit:
     """Fit parameters so that Σ residual² is least.
 

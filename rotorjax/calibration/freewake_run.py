@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from rotorjax.calibration.calibration_file import Calibration, fit_entry
-from rotorjax.calibration.drivers import Method, Progress
+from rotorjax.calibration.drivers import FitProgress, Method
 from rotorjax.calibration.fit import Fit, calibrate
 from rotorjax.calibration.taught import PARAMETERS
 from rotorjax.calibration.teacher import Lessons, default_held, inflow, lessons, residual, rms_difference
@@ -59,7 +59,7 @@ def run(
     parameters: Sequence[str] = PARAMETERS.names,
     held: Sequence[str] | None = None,
     method: Method = "least_squares",
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
 ) -> FreeWakeRun:
     """Fit the taught model to a study's cases but the held-out ones (default: `teacher.default_held`).
 

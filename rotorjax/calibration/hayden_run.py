@@ -12,7 +12,7 @@ from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import select
 from rotorjax.calibration import hayden
 from rotorjax.calibration.calibration_file import Calibration, fit_entry
-from rotorjax.calibration.drivers import Method, Progress
+from rotorjax.calibration.drivers import FitProgress, Method
 from rotorjax.calibration.fit import Fit, Many, calibrate, calibrate_many, even_starts
 from rotorjax.calibration.hayden import HaydenData
 from rotorjax.errors import InputError
@@ -72,7 +72,7 @@ def run(
     parameters: Sequence[str] = hayden.PARAMETERS.names,
     loading: hayden.Loading = "elliptic",
     tau: tuple[np.ndarray, np.ndarray] | None = None,
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
     drivers: Sequence[Method] = DRIVERS,
     starts: int = STARTS,
 ) -> HaydenRun:

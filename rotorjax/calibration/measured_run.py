@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from rotorjax.bench.settings import study_settings
 from rotorjax.calibration.calibration_file import Calibration, fit_entry
-from rotorjax.calibration.drivers import Progress
+from rotorjax.calibration.drivers import FitProgress
 from rotorjax.calibration.fit import Fit, conclude, judge
 from rotorjax.calibration.measured import (
     COLLECTIVE_DEG,
@@ -66,7 +66,7 @@ class _Wake:
         self.numbers = np.full(len(data.names), np.nan)
         self.slopes = np.zeros((len(data.names), len(names)))
         self.history: list[float] = []
-        self.progress: Progress | None = None
+        self.progress: FitProgress | None = None
         self._at: tuple[float, ...] = ()
 
     def residual(self, values: Float[np.ndarray, " P"]) -> np.ndarray:
@@ -106,7 +106,7 @@ def run(
     fitted: Sequence[str] = FITTED,
     quick: bool = False,
     max_steps: int = 40,
-    progress: Progress | None = None,
+    progress: FitProgress | None = None,
 ) -> MeasuredRun:
     """Fit settings of the free wake to Caradonna and Tung's rotor by least squares (trust region, exact derivatives).
 

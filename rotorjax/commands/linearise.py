@@ -11,7 +11,8 @@ from rotorjax.commands.arguments import add_flight, add_place, add_rotor
 
 if TYPE_CHECKING:
     from rotorjax.linearisation.found import Wanted
-    from rotorjax.trim.run import Progress, Request
+    from rotorjax.trim.run import Request
+    from rotorjax.wake.search import Progress
 
 
 def register(commands: argparse._SubParsersAction) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from rotorjax.bench.progress import Progress
+    from rotorjax.bench.progress import ProgressLine
     from rotorjax.sweep.pools import Pool
 
 
@@ -67,7 +67,7 @@ def run(chosen: argparse.Namespace) -> int:
     return 1 if lost else 0
 
 
-def pool_of(chosen: argparse.Namespace) -> "Callable[[Progress], Pool] | None":
+def pool_of(chosen: argparse.Namespace) -> "Callable[[ProgressLine], Pool] | None":
     """Who works; None for this process. Raises InputError where a cluster is asked for and there is none."""
     from rotorjax.checks import check_whole
     from rotorjax.sweep import pools

@@ -22,8 +22,9 @@ from rotorjax.ode.models import LinearModel, PeriodicModel
 from rotorjax.rotor import multiblade
 from rotorjax.rotor.hub import RotorInputs
 from rotorjax.trim.problem import Controls, inputs_at
-from rotorjax.trim.run import FREE_WAKE, Progress, Request, Result, prepare, run
+from rotorjax.trim.run import FREE_WAKE, Request, Result, prepare, run
 from rotorjax.trim.run import check as check_request
+from rotorjax.wake.search import Progress
 from rotorjax.wake.settings import flight_settings
 
 

@@ -14,7 +14,8 @@ from rotorjax.linearisation.stages import Stages
 from rotorjax.ode.hill import Exponents
 from rotorjax.ode.models import LinearModel
 from rotorjax.ode.threads import one_thread
-from rotorjax.trim.run import Progress, Result
+from rotorjax.trim.run import Result
+from rotorjax.wake.search import Progress
 
 WAKE = "wake"
 """First word of the name of a mode of the wake; those that grow are neighbouring turns that pair."""

@@ -24,7 +24,8 @@ from rotorjax.linearisation.trim_output import Found
 from rotorjax.ode.export import to_dataset
 from rotorjax.ode.harmonic import harmonic_model
 from rotorjax.ode.models import AZIMUTH, LinearModel
-from rotorjax.trim.run import Progress, Request, Result
+from rotorjax.trim.run import Request, Result
+from rotorjax.wake.search import Progress
 
 
 def flights(

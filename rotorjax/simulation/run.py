@@ -30,7 +30,7 @@ from rotorjax.simulation.start import Start, start_of
 from rotorjax.simulation.step import check_steps, instant, steps_per_turn
 
 SAVES = 12  # of a revolution
-Progress = Callable[[str], None]
+Told = Callable[[str], None]
 
 
 class Driver(eqx.Module):
@@ -116,7 +116,7 @@ def path_of(case: SimulationCase, rotor: Rotor, operating: OperatingPoint, tilt:
     return hub_path(motion, velocity, -tilt, case.duration * omega, ground)
 
 
-def fly(case: SimulationCase, progress: Progress | None = None, pace: Pace | None = None) -> Simulated:
+def fly(case: SimulationCase, progress: Told | None = None, pace: Pace | None = None) -> Simulated:
     """Trim, check the path and march, by the clock with a pace. Raises InputError where the case cannot be flown or
     does not trim.
     """
@@ -129,9 +129,7 @@ def fly(case: SimulationCase, progress: Progress | None = None, pace: Pace | Non
     return fly_from(case, start_of(case, report), report, pace)
 
 
-def fly_from(
-    case: SimulationCase, start: Start, progress: Progress | None = None, pace: Pace | None = None
-) -> Simulated:
+def fly_from(case: SimulationCase, start: Start, progress: Told | None = None, pace: Pace | None = None) -> Simulated:
     """March from a start. Raises InputError where the hub's path takes the disk into the ground.
 
     Warns of a history that changes faster than the steps.

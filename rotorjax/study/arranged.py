@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from rotorjax.bench.azimuth import refine_azimuth
 from rotorjax.bench.markdown import table
 from rotorjax.bench.plotting import new_figure, polar_contour, save, shared_levels, style
-from rotorjax.bench.single import Progress
 from rotorjax.inflow.balance import Stations, pressure
 from rotorjax.io import netcdf
 from rotorjax.io.atomic import write_json, write_text
@@ -27,6 +26,7 @@ from rotorjax.potential.model import finite_state_model
 from rotorjax.potential.rotors import Rotors, inflow_at, mean_inflows, rotors, steady, velocity
 from rotorjax.potential.surfaces import IN_SHADOW
 from rotorjax.study.arrangement import Arrangement
+from rotorjax.wake.search import Progress
 from rotorjax.wake.several_solution import SeveralSolution, solve_several
 
 AZIMUTHS = 24

@@ -15,9 +15,10 @@ from rotorjax.bench.flapping import flapping_dataset
 from rotorjax.bench.record import add_finite_state
 from rotorjax.bench.schedule import Schedule
 from rotorjax.bench.settings import StudySettings
-from rotorjax.bench.single import Progress, Solver, solve_wake
+from rotorjax.bench.single import Solver, solve_wake
 from rotorjax.study import kept
 from rotorjax.trim.held import let_flap
+from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import rehearse, solve
 
 

@@ -1,7 +1,7 @@
 """What is found at a point: numbers by name, one verdict, and what a neighbour can start from."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -12,9 +12,9 @@ from rotorjax.inflow.balance import Balance
 from rotorjax.operating import OperatingPoint
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.sweep.keys import Quantity
+from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import Solution
 
-Progress = Callable[[str, float], None]
 CONVERGED, STALLED, NONE = "converged", "stalled", "no solution"
 STALLED_WITHIN = 0.02
 """Largest accuracy of the loads with which a point that stalled still stands in the table."""

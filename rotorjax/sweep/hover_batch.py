@@ -21,8 +21,9 @@ from rotorjax.potential.model import FiniteStateModel
 from rotorjax.rotor.geometry import Rotor, solidity, twist
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import DesignPoint
-from rotorjax.sweep.found import Found, Neighbour, Progress, judged, of_hover, refused
+from rotorjax.sweep.found import Found, Neighbour, judged, of_hover, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
+from rotorjax.wake.search import Progress
 
 SIZE = 32
 """Points that are solved at once; a sweep that is stopped loses so many at most."""

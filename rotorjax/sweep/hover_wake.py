@@ -13,8 +13,9 @@ from rotorjax.bench.single import check_case
 from rotorjax.bench.wake_file import lost_at, model_of, start_of, state_arrays, to_dataset
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import DesignPoint
-from rotorjax.sweep.found import Found, Neighbour, Progress, judged, of_hover
+from rotorjax.sweep.found import Found, Neighbour, judged, of_hover
 from rotorjax.sweep.rotors import rotor_of, values_of
+from rotorjax.wake.search import Progress
 from rotorjax.wake.solution import solve as solve_wake
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import equinox as eqx
 import jax
 
-from rotorjax.bench.progress import Progress
+from rotorjax.bench.progress import ProgressLine
 from rotorjax.errors import InputError
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import DesignPoint, plan, points_of
@@ -78,7 +78,7 @@ def sweep(
     case: SweepCase,
     folder: str | Path,
     *,
-    pool: Callable[[Progress], Pool] | None = None,
+    pool: Callable[[ProgressLine], Pool] | None = None,
     solver: PointSolver | None = None,
 ) -> Swept:
     """Solve all points, keeping each in folder/points as soon as it is done; what is there is not solved again.
@@ -91,7 +91,7 @@ def sweep(
     work = prepare(case, problem)
     shelf.open()
     points = points_of(case)
-    with Progress("sweep", len(points)) as progress:
+    with ProgressLine("sweep", len(points)) as progress:
         found = dict(work.refused)
         for task in work.tasks:
             kept = shelf.take_up(task, progress.say)
@@ -107,7 +107,12 @@ def sweep(
 
 
 def _work_off(
-    work: Work, solver: PointSolver, pool: Pool, found: dict[DesignPoint, Found], shelf: PointShelf, progress: Progress
+    work: Work,
+    solver: PointSolver,
+    pool: Pool,
+    found: dict[DesignPoint, Found],
+    shelf: PointShelf,
+    progress: ProgressLine,
 ) -> None:
     """Submit each task once the point that it starts from is done, and keep what comes back."""
     waiting = [task for task in work.tasks if task[0] not in found]

@@ -15,7 +15,7 @@ from rotorjax.errors import InputError
 from rotorjax.linearisation.readings import readings
 from rotorjax.sweep.case import SweepCase
 from rotorjax.sweep.design import DesignPoint
-from rotorjax.sweep.found import Found, Neighbour, Progress, dimensional, judged, refused
+from rotorjax.sweep.found import Found, Neighbour, dimensional, judged, refused
 from rotorjax.sweep.rotors import rotor_of, values_of, wanted_thrust
 from rotorjax.trim import run as trimming
 from rotorjax.trim.in_wake import TrimmedInWake
@@ -23,6 +23,7 @@ from rotorjax.trim.means import evaluated
 from rotorjax.trim.problem import inputs_at, node_azimuths, rates_and_outputs
 from rotorjax.trim.run import Request, numbers, restored, unknowns
 from rotorjax.trim.solve import Trimmed
+from rotorjax.wake.search import Progress
 from rotorjax.wake.settings import flight_settings, wake_settings
 
 READ = ("CT", "CP", "CP_induced", "CP_profile", "CP_parasite", "CP_damper", "figure_of_merit", "collective_deg")

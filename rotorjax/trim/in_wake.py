@@ -34,10 +34,9 @@ from rotorjax.rotor.hub import RotorInputs
 from rotorjax.trim.free_wake import InWake, WakeTrim, carried, first_guess, flown, passed, residual
 from rotorjax.trim.problem import Aim
 from rotorjax.wake.model import AMONG, FreeWake, free_wake
+from rotorjax.wake.search import Progress
 from rotorjax.wake.settings import WakeSettings, flight_settings, wake_settings
 from rotorjax.wake.solution import solve
-
-Progress = Callable[[str, float], None]
 
 TOL = 1e-7
 """Relative rms of the residual of wake, blades and controls together."""

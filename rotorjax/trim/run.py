@@ -1,7 +1,6 @@
 """A trim from what a user asks for, with any inflow, and the numbers that it comes to."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -30,9 +29,9 @@ from rotorjax.trim.means import Means, means
 from rotorjax.trim.problem import Aim, TrimResidual, inputs_at, outputs_at
 from rotorjax.trim.solve import AZIMUTHS, Trimmed, flight, guess, trim
 from rotorjax.trim.verdict import Verdict, verdict
+from rotorjax.wake.search import Progress
 from rotorjax.wake.settings import WakeSettings
 
-Progress = Callable[[str, float], None]
 FREE_WAKE = "freewake"
 INFLOWS = (*NAMES, FREE_WAKE)
 

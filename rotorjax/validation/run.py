@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tqdm import tqdm
@@ -13,8 +13,6 @@ from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.point import Point, needed
 from rotorjax.validation.row import Row
 from rotorjax.wake.solution import Solution, solve
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,7 @@ from rotorjax.wake.performance import Coefficients
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.search import MOST_SLICES, Progress
 from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
-from rotorjax.wake.solution import Solution, lowest_node, readings, solve, told_of
-
-Number = Numbers = Any
+from rotorjax.wake.solution import Number, Numbers, Solution, lowest_node, readings, solve, told_of
 
 AT_ONCE = 8
 """Newton iterations from wakes alone to wakes together: what takes more is found sooner by shares."""
