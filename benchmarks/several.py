@@ -234,7 +234,7 @@ def draw_linear(times, found, path: Path) -> None:
                     axes.plot(times / 2 / np.pi, truth[:, k, i], label=f"{where}: march")
                     axes.plot(times / 2 / np.pi, ours[:, k, i], "k--", lw=1.2, label="linear model" if i else None)
                 axes.set(xlabel="revolutions", ylabel=f"change of ${of}$", title=name)
-        legend_below(figure.axes[0], 3)
+        legend_below(figure.axes[2], 3)
     save_file(figure, path)
 
 
