@@ -36,8 +36,8 @@ PAIR = [(0.0, -HALF, 0.0), (0.0, HALF, 0.0)]
 QUAD = [(-HALF, -HALF, 0.0), (-HALF, HALF, 0.0), (HALF, HALF, 0.0), (HALF, -HALF, 0.0)]
 YAW = 0.03
 STEPS = {
-    "yaw: diagonal pairs 0.2 % faster and slower": ("omega", 0.002 * np.array([1, -1, 1, -1])),
-    "all collectives up by 0.05°": ("theta_0", np.full(4, np.deg2rad(0.05))),
+    "yaw: diagonal pairs 0.2 % faster and slower": {"omega": 0.002 * np.array([1, -1, 1, -1])},
+    "all collectives up by 0.05°": {"theta_0": np.full(4, np.deg2rad(0.05))},
 }
 HEIGHTS = (3.0, 2.0, 1.5, 1.0, 0.75)
 
@@ -190,15 +190,12 @@ def linear(settings, out: Path | None) -> dict:
     row = {"converged": solved.converged, "linearise_seconds": time.perf_counter() - began, "order": model.order}
     row |= {"step_error": model.notes["step_error"], "largest_growth": float(model.poles().real.max())}
     marched = rj.march(solved, precision="double")
-    commands = {name: dict.fromkeys(("theta_0", "omega"), np.zeros(4)) for name in STEPS}
-    for name, (of, size) in STEPS.items():
-        commands[name] |= {of: size}
-    rest = responses(marched, solved, dict.fromkeys(("theta_0", "omega"), np.zeros(4)))
+    rest = responses(marched, solved, {})
     times = 2 * np.pi / marched.steps_per_turn * np.arange(len(rest))
     found = {}
-    for name, change in commands.items():
+    for name, change in STEPS.items():
         truth = responses(marched, solved, change) - rest
-        ours = model.step(times) @ np.concatenate([change["theta_0"], change["omega"]])
+        ours = model.step(times) @ np.concatenate([change.get(of, np.zeros(4)) for of in ("theta_0", "omega")])
         found[name] = truth, ours.reshape(truth.shape)
         gap = np.abs(truth - found[name][1]).max(axis=(0, 2)) / np.abs(truth).max(axis=(0, 2))
         row |= {name: dict(zip(("CT", "CQ", "inflow"), gap.tolist(), strict=True))}
@@ -234,7 +231,7 @@ def draw_linear(times, found, path: Path) -> None:
                     axes.plot(times / 2 / np.pi, truth[:, k, i], label=f"{where}: march")
                     axes.plot(times / 2 / np.pi, ours[:, k, i], "k--", lw=1.2, label="linear model" if i else None)
                 axes.set(xlabel="revolutions", ylabel=f"change of ${of}$", title=name)
-        legend_below(figure.axes[2], 3)
+        figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     save_file(figure, path)
 
 

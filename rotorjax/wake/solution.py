@@ -122,9 +122,15 @@ def solve(
     if near is not None and not search.ok and not search.interrupted:
         again = Search(tol, progress, iterations=search.iterations)
         there, y = _way(model, None, again)
-        if again.ok or again.interrupted:
+        nearer = _is_case(there, model) and not _is_case(here, model)
+        if again.ok or again.interrupted or nearer:
             here, x, search = there, y, again
     return read(here, x, search, clock)
+
+
+def _is_case(here: FreeWake, model: FreeWake) -> bool:
+    """Whether a search that ended here had come to the case, if not to its wake."""
+    return bool(eqx.tree_equal(on_host(here), on_host(model)))
 
 
 def _way(model: FreeWake, start: Solution | None, search: Search) -> tuple[FreeWake, Unknowns]:

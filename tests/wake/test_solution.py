@@ -139,10 +139,18 @@ def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monk
 
     def nowhere(self, model):
         self.ok, self.why = False, "no way from nothing either"
-        return model, grounded.unknowns
+        return grounded.model, grounded.unknowns
 
     monkeypatch.setattr(search.Search, "from_nothing", nowhere)
     stages.clear()
     lost = solve(higher, start=grounded)
     assert (lost.converged, lost.why) == (False, "lost")
     assert float(lost.model.ground.height) == 1.0
+
+    def stalls_there(self, model):
+        self.ok, self.why = False, "stalled"
+        return model, grounded.unknowns
+
+    monkeypatch.setattr(search.Search, "from_nothing", stalls_there)
+    stages.clear()
+    assert solve(higher, start=grounded).why == "stalled"  # at the case itself, which the neighbour's way did not reach
