@@ -16,19 +16,40 @@ from rotorjax.errors import InputError
 from rotorjax.ode.continuation import Steps, continuation
 from rotorjax.ode.implicit import attach
 from rotorjax.ode.linear import Krylov
-from rotorjax.ode.newton import newton
+from rotorjax.ode.newton import SMALLEST_STEP, newton
 from rotorjax.ode.outcome import Outcome
 from rotorjax.wake import several as flow
 from rotorjax.wake.equilibrium import METHOD, Evaluation, Unknowns, displacement, spread
-from rotorjax.wake.model import WakeState
+from rotorjax.wake.model import FreeWake, WakeState
 from rotorjax.wake.performance import Coefficients
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
 from rotorjax.wake.search import MOST_SLICES, Progress
-from rotorjax.wake.several import SeveralWakes, Together, evaluate, loads_of, residual, told, with_collectives
+from rotorjax.wake.several import (
+    THRUST_SLOPE,
+    SeveralWakes,
+    Together,
+    evaluate,
+    loads_of,
+    residual,
+    told,
+    with_collectives,
+)
 from rotorjax.wake.solution import Number, Numbers, Solution, lowest_node, readings, solve, told_of
 
 AT_ONCE = 8
 """Newton iterations from wakes alone to wakes together: what takes more is found sooner by shares."""
+
+SHORTEST = 0.25
+"""Least share of these steps: wakes from which shorter ones are needed are too far from there."""
+
+TIGHT = 1e-3
+"""Least relative tolerance of Newton's linear solve where a step is too long; that is seldom for want of digits."""
+
+CLOSE = 1e-4
+"""How close the thrust of a rotor alone comes to what is asked of it, over that."""
+
+MOST_ALONE = 200
+"""Iterations after which a rotor alone is left at the thrust that it has."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +149,7 @@ def solve_several(
     if not all(one.converged for one in alone):
         return _read(_share(several, 0.0), _outcome(several, alone), spent)
     x, linear = _outcome(several, alone).x, _method(several, alone[0].unknowns)
-    found = _newton(several, x, linear, tol, AT_ONCE)
+    found = _newton(several, x, linear, tol, AT_ONCE, SHORTEST)
     _tell(progress, "together", found)
     spent += found.iterations
     if found.converged or found.interrupted:
@@ -186,31 +207,60 @@ def _share(several: SeveralWakes, coupling: float) -> SeveralWakes:
     return several if several.surfaces is None else eqx.tree_at(lambda s: s.surfaces.share, several, part)
 
 
-def _newton(several: SeveralWakes, x: Together, linear: Krylov, tol: float, most: int) -> Outcome:
-    return newton(told, x, several, linear=linear, tol=tol, max_iterations=most)
+def _newton(
+    several: SeveralWakes, x: Together, linear: Krylov, tol: float, most: int, shortest: float = SMALLEST_STEP
+) -> Outcome:
+    return newton(told, x, several, linear=linear, tol=tol, max_iterations=most, smallest_step=shortest)
 
 
 def _method(several: SeveralWakes, alone: Unknowns) -> Krylov:
     """Newton's linear solver, helped by the inverse Jacobian of the first rotor alone, for each."""
-    return replace(METHOD, precondition=EachInverse(harmonic_inverse(several.one(0).levelled, alone, several.slices)))
+    inverse = harmonic_inverse(several.one(0).levelled, alone, several.slices)
+    return replace(METHOD, precondition=EachInverse(inverse), tightest=TIGHT)
 
 
 def _alone(several: SeveralWakes, progress: Progress | None, tol: float) -> tuple[list[Solution], int]:
-    """Each rotor's own axisymmetric wake over its floor; the next begins with the last one's."""
+    """Each rotor's own axisymmetric wake over its floor, at the thrust asked of it; the next begins with the last."""
     found: list[Solution] = []
+    spent = 0
     for i in range(len(several)):
-        found.append(solve(several.one(i).levelled, found[-1] if found else None, progress, tol))
-        if not found[-1].converged:
-            found += [found[-1]] * (len(several) - i - 1)
+        thrust, last = None if several.thrusts is None else float(several.thrusts[i]), found[-1] if found else None
+        one, more = _one_alone(several.one(i).levelled, thrust, last, progress, tol)
+        found.append(one)
+        spent += more
+        if not one.converged:
+            found += [one] * (len(several) - i - 1)
             break
-    return found, sum(one.iterations for one in found)
+    return found, spent
+
+
+def _one_alone(
+    model: FreeWake, thrust: float | None, start: Solution | None, progress: Progress | None, tol: float
+) -> tuple[Solution, int]:
+    """A rotor's wake, or the one closest to a thrust by the secant rule in its collective, and iterations in all."""
+    if thrust is not None and start is not None:
+        model = _pitched(model, start.model.operating.collective)
+    found = solve(model, start, progress, tol)
+    spent, slope = found.iterations, THRUST_SLOPE
+    while thrust is not None and found.converged and abs(thrust - found.CT) > CLOSE * thrust and spent < MOST_ALONE:
+        change = (thrust - found.CT) / slope
+        new = solve(_pitched(model, found.model.operating.collective + change), found, progress, tol)
+        spent += new.iterations
+        if not new.converged:
+            break
+        slope, found = (new.CT - found.CT) / change, new
+    return found, spent
+
+
+def _pitched(model: FreeWake, collective: Any) -> FreeWake:
+    return eqx.tree_at(lambda m: m.operating.collective, model, jnp.asarray(collective))
 
 
 def _outcome(several: SeveralWakes, alone: list[Solution]) -> Outcome:
     """The rotors' own wakes as an outcome of the whole."""
     wakes = jax.tree.map(lambda *a: jnp.stack(a), *(spread(one.unknowns, several.slices) for one in alone))
     worst = max(alone, key=lambda one: one.residual)
-    x = Together(wakes, several.wakes.operating.collective)
+    x = Together(wakes, jnp.stack([one.model.operating.collective for one in alone]))
     return Outcome(x, worst.residual, (worst.residual,), 0, worst.converged, f"alone: {worst.why}", 0.0)
 
 
