@@ -26,15 +26,16 @@ ROTOR = finite_state_model(harmonics=1, radial_terms=2, ground_harmonics=1, quad
 VARIANTS = ("static", "quasi-steady", "dynamic")
 
 
-def make(variant, blades=True, slope=(-6.0, 6.0), rotor=ROTOR):
+def make(variant, blades=True, slope=(-6.0, 6.0), rotor=ROTOR, table=None):
     transport = TRANSPORT if variant == "dynamic" else None
-    table = ground_table(rotor, (0.5, 2.0), slope, transport=transport)
+    table = ground_table(rotor, (0.5, 2.0), slope, transport=transport) if table is None else table
     return over_ground(rotor, table, linear_blades(0.08) if blades else None, variant, transport, stations(0.1, 8, 6))
 
 
 @pytest.fixture(scope="module")
 def models():
-    return {variant: make(variant) for variant in VARIANTS}
+    static = make("static")
+    return {"static": static, "quasi-steady": make("quasi-steady", table=static.table), "dynamic": make("dynamic")}
 
 
 def at_rest(collective=8.0, height=1.0, slope_deg=5.0, climb=0.0):

@@ -50,12 +50,12 @@ def grounded(uh60, coarse, hover):
     return solve(free_wake(*uh60, plane(1.0), coarse), start=hover)
 
 
-def test_half_the_pitch_is_a_way_to_the_same_wake(grounded):
+def test_half_the_pitch_is_a_way_to_the_same_wake(hover):
     search_ = search.Search(1e-7, None)
-    there, x = search_.by_way_of_less_pitch(search.on_host(grounded.model))
+    there, x = search_.by_way_of_less_pitch(search.on_host(hover.model))
     assert search_.ok, search_.why
-    assert float(there.operating.collective) == float(grounded.model.operating.collective)
-    np.testing.assert_allclose(x.gamma_bound, grounded.state.gamma_bound, rtol=1e-5)
+    assert float(there.operating.collective) == float(hover.model.operating.collective)
+    np.testing.assert_allclose(x.gamma_bound, hover.state.gamma_bound, rtol=1e-5)
 
 
 def test_iterations_that_close_in_go_on_beyond_their_limit(grounded, monkeypatch):
