@@ -1,4 +1,4 @@
-"""A coaxial pair in the free wake: `python benchmarks/coaxial.py [--json FILE] [--quick] [--derivative]`.
+"""A coaxial pair in the free wake: `python benchmarks/coaxial.py [--json FILE] [--quick] [--ground] [--derivative]`.
 
 Of the rotor that NACA TN 2318 tested (`tn2318_2`), two of them 0.19 R apart in every other place. At equal thrusts,
 induced power of the pair over that of two rotors alone, over the distance between them: momentum theory has √2 at no
@@ -22,6 +22,8 @@ jax.config.update("jax_enable_x64", True)
 
 SPACING = 0.19
 DISTANCES = (0.02, 0.05, 0.1, 0.19, 0.4, 0.8, 1.6)
+HEIGHTS = (3.0, 2.0, 1.5, 1.0, 0.75)
+"""Of the lower rotor over the ground, over R."""
 
 
 def interference(settings, thrust=0.004):
@@ -36,6 +38,27 @@ def interference(settings, thrust=0.004):
         ratio = (found.CP_induced / alone).tolist()
         row = {"distance": distance, "upper": ratio[0], "lower": ratio[1], "pair": float(np.mean(ratio))}
         print(json_text(row | {"converged": found.converged, "why": found.why}), flush=True)
+        rows.append(row)
+    return rows
+
+
+def over_ground(settings, thrust=0.004):
+    """Induced power at one thrust over that in free air, of the pair's rotors and of one alone, over height."""
+    rotor, operating = rj.rotor("tn2318_2", 8.0)
+
+    def powers(places, height, start=None):
+        ground = None if height is None else rj.plane(height)
+        model = rj.several_wakes(rotor, operating, places, settings=settings, ground=ground, thrusts=thrust)
+        return rj.solve(model, start)
+
+    pair, single = [(0, 0, SPACING), (0, 0, 0)], [(0, 0, 0)]
+    free, rows, found = [powers(places, None) for places in (pair, single)], [], [None, None]
+    for height in HEIGHTS:
+        found = [powers(places, height, start) for places, start in zip((pair, single), found, strict=True)]
+        both, one = (here.CP_induced / there.CP_induced for here, there in zip(found, free, strict=True))
+        row = {"height": height, "upper": float(both[0]), "lower": float(both[1]), "single": float(one[0])}
+        row["pair"] = float(found[0].CP_induced.sum() / free[0].CP_induced.sum())
+        print(json_text(row | {"converged": [f.converged for f in found], "why": [f.why for f in found]}), flush=True)
         rows.append(row)
     return rows
 
@@ -64,13 +87,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", type=Path, help="file for all numbers")
     parser.add_argument("--quick", action="store_true", help="quick settings of the wake")
+    parser.add_argument("--ground", action="store_true", help="the pair over level ground")
     parser.add_argument("--derivative", action="store_true", help="check the derivative of power by thrust, alone")
     chosen = parser.parse_args()
     settings = rj.quick_settings() if chosen.quick else rj.WakeSettings()
     if chosen.derivative:
         derivative(settings)
         return
-    found = interference(settings)
+    found = over_ground(settings) if chosen.ground else interference(settings)
     if chosen.json is not None:
         chosen.json.write_text(json_text(found, indent=1))
 

@@ -66,10 +66,10 @@ the fixed point converge from a prescribed wake, in slow flight and near the gro
 QUICK, CAREFUL, FINE = (2.0, 1.4), (2.8, 2.0, 1.7, 1.5, 1.35, 1.2, 1.1), (THICK, 3.0, 2.3, 1.8, 1.4, 1.2)
 """Cores on the way: on the first one, where that is lost, and with the highest harmonics damped."""
 
-DAMPED = 0.3
-"""Damping of the highest harmonics over the azimuth (`azimuth_damping`) for a wake that is not found without: beside
-the disk in slow flight vortices lie within each other's cores and wind round each other, twelve azimuths have one or
-two nodes for that, and nothing else damps it.
+DAMPED = (0.3, 1.0)
+"""Damping of the highest harmonics over the azimuth (`azimuth_damping`) for a wake that is not found without, or with
+less: beside the disk in slow flight vortices lie within each other's cores and wind round each other, twelve azimuths
+have one or two nodes for that, and nothing else damps it.
 """
 
 WASHOUT, FAR = 0.08, 4.0
@@ -267,7 +267,7 @@ def _to_thrust(thrust: float, z: InWake, p: WakeTrim, stages: _Stages) -> Outcom
 
 def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> TrimmedInWake:
     """From a wake with thick cores as these thin, quickly; where that is lost in careful steps; where those are, too,
-    with the highest harmonics over the azimuth damped.
+    with the highest harmonics over the azimuth damped, as little as leads there.
     """
     thick = _with_cores(replace(p, aim="flapping"), THICK)
     start = stages.passes("thick cores", _prescribed(thick, controls, coning), thick, ROUGH)
@@ -279,18 +279,18 @@ def _from_wind(p: WakeTrim, controls, coning: float, stages: _Stages) -> Trimmed
         found = _thinner(p, start.x, cores, rough, stages)
         if found.converged or stages.interrupted:
             return TrimmedInWake(found.x, p, found, stages.iterations)
-    damped = _damped(p)
-    again = _thinner(damped, start.x, FINE, TIGHT, stages)
-    if again.converged or stages.interrupted:
-        return TrimmedInWake(again.x, damped, again, stages.iterations)
+    asked = p.model.settings.azimuth_damping
+    for rate in dict.fromkeys(max(rate, asked) for rate in DAMPED):
+        damped = _damped(p, rate)
+        again = _thinner(damped, start.x, FINE, TIGHT, stages)
+        if again.converged or stages.interrupted:
+            return TrimmedInWake(again.x, damped, again, stages.iterations)
     return _lost(found.x, f"{found.why}; with the highest harmonics damped {again.why}", p, stages)
 
 
-def _damped(p: WakeTrim) -> WakeTrim:
-    """The trim with the highest harmonics over the azimuth damped, by no less than asked for."""
-    settings = p.model.settings
-    damped = replace(settings, azimuth_damping=max(DAMPED, settings.azimuth_damping))
-    return replace(p, model=replace(p.model, settings=damped))
+def _damped(p: WakeTrim, rate: float) -> WakeTrim:
+    """The trim with the highest harmonics over the azimuth damped."""
+    return replace(p, model=replace(p.model, settings=replace(p.model.settings, azimuth_damping=rate)))
 
 
 def _thinner(p: WakeTrim, z: InWake, cores: tuple[float, ...], rough: float, stages: _Stages) -> Outcome:

@@ -17,6 +17,7 @@ from rotorjax.rotor.hub import rotor_inputs
 from rotorjax.rotor.moving_blade import AirLoads
 from rotorjax.simulation.start import from_wake
 from rotorjax.simulation.step import instant
+from rotorjax.trim import in_wake
 from rotorjax.trim.free_wake import hub_moment, residual
 from rotorjax.trim.in_wake import (
     QUICK,
@@ -200,7 +201,7 @@ def test_a_trim_says_what_it_is_worth(cruise, told):
 
 @pytest.mark.slow
 def test_damping_the_highest_harmonics_is_told_and_changes_little(cruise):
-    damped = _damped(cruise.trimmed.p)
+    damped = _damped(cruise.trimmed.p, 0.3)
     outcome = _Stages(None).found("trim", cruise.trimmed.z, damped, TOL)
     found = replace(cruise.trimmed, z=outcome.x, p=damped, outcome=outcome)
     assert "converged with its highest harmonics damped (azimuth_damping = 0.3)" in str(verdict(found))
@@ -209,6 +210,30 @@ def test_damping_the_highest_harmonics_is_told_and_changes_little(cruise):
     np.testing.assert_allclose(means(found).CQ, cruise.means.CQ, rtol=0.01)
     with pytest.warns(UserWarning, match=r"azimuth_damping = 0\.3\); a march and a linear model have no such damping"):
         from_wake(found)
+
+
+def test_as_much_is_damped_as_leads_to_a_trim(cruise, monkeypatch):
+    """By no less than asked for, and once."""
+    made, start = cruise.trimmed.p, (jnp.asarray(cruise.means.controls[:3]), float(cruise.means.flap[0]))
+
+    def tried(asked, enough):
+        rates = []
+
+        def thinner(p, *_):
+            rates.append(p.model.settings.azimuth_damping)
+            return replace(cruise.trimmed.outcome, converged=rates[-1] >= enough)
+
+        monkeypatch.setattr(in_wake, "_thinner", thinner)
+        p = replace(made, model=replace(made.model, settings=replace(made.model.settings, azimuth_damping=asked)))
+        found = in_wake._from_wind(p, *start, _Stages(None))
+        return rates, found.outcome.converged and found.p.model.settings.azimuth_damping
+
+    lost = replace(cruise.trimmed.outcome, converged=False)
+    monkeypatch.setattr(_Stages, "passes", lambda *_: cruise.trimmed.outcome)
+    monkeypatch.setattr(in_wake, "_lost", lambda *_: replace(cruise.trimmed, outcome=lost))
+    assert tried(0.0, 0.3) == ([0.0, 0.0, 0.3], 0.3)
+    assert tried(0.0, 1.0) == ([0.0, 0.0, 0.3, 1.0], 1.0)
+    assert tried(2.0, 9.0) == ([2.0, 2.0, 2.0], False)
 
 
 @pytest.mark.slow
