@@ -21,6 +21,10 @@ MOST_DEATHS = 3
 """Deaths of workers over one job, after which it is the job's fault."""
 
 
+PATIENCE = 5.0
+"""Seconds that a worker that waits has to end by itself."""
+
+
 class Job(NamedTuple):
     """work(*arguments), with a progress callback where the work is done in this process."""
 
@@ -121,8 +125,13 @@ class Processes:
         self._hand_over(key, content, deaths + 1)
 
     def close(self) -> None:
-        """Kill the workers."""
-        for process in [p for p, _ in self._idle] + [entry[0] for entry in self._busy.values()]:
+        """Let those go that wait, so that they leave nothing behind; kill those that work."""
+        for _, pipe in self._idle:
+            pipe.close()
+        for process, *_ in self._busy.values():
+            process.kill()
+        for process, *_ in [*self._idle, *self._busy.values()]:
+            process.join(PATIENCE)
             process.kill()
             process.join()
 
@@ -210,7 +219,7 @@ def _serve(pipe: Connection) -> None:
         try:
             content = pipe.recv_bytes()
         except (EOFError, OSError):
-            os._exit(0)
+            return
         try:
             answer = _work_packed(content)
         except Exception as error:
@@ -218,7 +227,7 @@ def _serve(pipe: Connection) -> None:
         try:
             pipe.send_bytes(answer)
         except OSError:
-            os._exit(0)
+            return
 
 
 def _packed_error(error: Exception) -> bytes:

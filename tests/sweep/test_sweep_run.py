@@ -160,8 +160,10 @@ def test_a_killed_sweep_ends_alike(tmp_path, whole):
 @pytest.mark.slow
 def test_two_processes_give_the_same_and_one_that_dies_loses_nothing(tmp_path, whole, monkeypatch, capsys):
     monkeypatch.setenv("MADE_UP_DEATH", str(tmp_path / "dead"))
-    found = swept(tmp_path / "out", deadly, pool=lambda line: Processes(2, line.say))
+    pools = []
+    found = swept(tmp_path / "out", deadly, pool=lambda line: pools.append(Processes(2, line.say)) or pools[0])
     assert (tmp_path / "dead").exists()
+    assert [process.exitcode for process, _ in pools[0]._idle] == [0, 0]  # a killed one's semaphores are warned of
     assert "its job is done again" in capsys.readouterr().err
     xr.testing.assert_identical(found, whole)
 
