@@ -48,6 +48,12 @@ TIGHT = 1e-3
 CLOSE = 1e-4
 """How close the thrust of a rotor alone comes to what is asked of it, over that."""
 
+FARTHEST = 0.1
+"""Most that the collective is moved at once (rad): beyond stall thrust says nothing of the way back."""
+
+STALLED = 0.2 * THRUST_SLOPE
+"""Less thrust than this a radian of collective means that the blades stall."""
+
 MOST_ALONE = 200
 """Iterations after which a rotor alone is left at the thrust that it has."""
 
@@ -243,13 +249,24 @@ def _one_alone(
     found = solve(model, start, progress, tol)
     spent, slope = found.iterations, THRUST_SLOPE
     while thrust is not None and found.converged and abs(thrust - found.CT) > CLOSE * thrust and spent < MOST_ALONE:
-        change = (thrust - found.CT) / slope
+        change = np.clip((thrust - found.CT) / slope, -FARTHEST, FARTHEST)
         new = solve(_pitched(model, found.model.operating.collective + change), found, progress, tol)
         spent += new.iterations
         if not new.converged:
             break
-        slope, found = (new.CT - found.CT) / change, new
+        slope = (new.CT - found.CT) / change
+        if thrust > new.CT and slope < STALLED:
+            return replace(new, converged=False, why=_out_of_reach(thrust, new)), spent
+        found = new
     return found, spent
+
+
+def _out_of_reach(thrust: float, found: Solution) -> str:
+    pitch = np.rad2deg(float(found.model.operating.collective))
+    return (
+        f"C_T = {thrust:.4g} is out of a rotor's reach: alone, at {pitch:.1f}° of collective, it has {found.CT:.4g}, "
+        "and more pitch brings little more; ask for less in `thrusts`, or give the rotors more or broader blades"
+    )
 
 
 def _pitched(model: FreeWake, collective: Any) -> FreeWake:

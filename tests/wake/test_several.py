@@ -141,6 +141,13 @@ def test_rotors_are_brought_to_their_thrusts_before_they_see_each_other(coaxial,
     assert coaxial.found.iterations < 40
 
 
+def test_a_thrust_beyond_stall_is_told(uh60):
+    lost = rj.solve(several_wakes(*uh60, [(0, 0, 0)], settings=SETTINGS, collectives_deg=28.0, thrusts=0.03))
+    assert not lost.converged
+    assert "C_T = 0.03 is out of a rotor's reach" in lost.why
+    assert 0.01 < lost.CT[0] < 0.016
+
+
 @pytest.mark.slow
 def test_nodes_under_the_ground_are_told_of_all_rotors(uh60, coaxial):
     """Whosever they are; in free air there are none."""
