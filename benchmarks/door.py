@@ -41,7 +41,7 @@ print(float(jax.jit(jax.grad(thrust))(1.0)))""",
         (7, 12),
         """import rotorjax as rj
 hover = rj.solve(rj.free_wake(*rj.rotor("uh60", 18.0), rj.plane(1.0)))
-model = rj.linearise(hover, ("collective", "height"), ("thrust",))
+model = rj.linearise(hover, ("collective", "height"), ("CT",))
 print(float(abs(model.b).max()))""",
     ),
     "calibration of b and p": (
