@@ -46,15 +46,15 @@ def over_ground(settings, thrust=0.004):
     """Induced power at one thrust over that in free air, of the pair's rotors and of one alone, over height."""
     rotor, operating = rj.rotor("tn2318_2", 8.0)
 
-    def powers(places, height, start=None):
+    def solved(places, height, start=None):
         ground = None if height is None else rj.plane(height)
         model = rj.several_wakes(rotor, operating, places, settings=settings, ground=ground, thrusts=thrust)
         return rj.solve(model, start)
 
     pair, single = [(0, 0, SPACING), (0, 0, 0)], [(0, 0, 0)]
-    free, rows, found = [powers(places, None) for places in (pair, single)], [], [None, None]
+    free, rows, found = [solved(places, None) for places in (pair, single)], [], [None, None]
     for height in HEIGHTS:
-        found = [powers(places, height, start) for places, start in zip((pair, single), found, strict=True)]
+        found = [solved(places, height, start) for places, start in zip((pair, single), found, strict=True)]
         both, one = (here.CP_induced / there.CP_induced for here, there in zip(found, free, strict=True))
         row = {"height": height, "upper": float(both[0]), "lower": float(both[1]), "single": float(one[0])}
         row["pair"] = float(found[0].CP_induced.sum() / free[0].CP_induced.sum())

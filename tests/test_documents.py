@@ -68,6 +68,7 @@ def test_ci_runs_the_readmes_test_command():
     pattern = re.search(r'grep -E "(.*)" README.md', script)
     assert pattern is not None
     assert [line for line in README.splitlines() if re.search(pattern[1], line)] == [TESTS.strip()]
+    assert TESTS.split(" && ")[-1].startswith(".venv/bin/pytest ")  # apart from what comes before, style beside it
 
 
 @pytest.fixture(scope="module")

@@ -20,8 +20,7 @@ from rotorjax.errors import InputError
 MOST_DEATHS = 3
 """Deaths of workers over one job, after which it is the job's fault."""
 
-
-PATIENCE = 5.0
+PATIENCE = 10.0
 """Seconds that a worker that waits has to end by itself."""
 
 

@@ -51,11 +51,11 @@ CLOSE = 1e-4
 FARTHEST = 0.1
 """Most that the collective is moved at once (rad): beyond stall thrust says nothing of the way back."""
 
-STALLED = 0.2 * THRUST_SLOPE
-"""Less thrust than this a radian of collective means that the blades stall."""
+STALLED, TOLD = 0.2 * THRUST_SLOPE, 0.01
+"""Thrust a radian of collective below which the blades stall, and over how many radians more that is seen."""
 
-MOST_ALONE = 200
-"""Iterations after which a rotor alone is left at the thrust that it has."""
+MOST_PITCHES = 20
+"""Collectives after which a rotor alone is left at the thrust that it has."""
 
 
 @dataclass(frozen=True)
@@ -248,14 +248,18 @@ def _one_alone(
         model = _pitched(model, start.model.operating.collective)
     found = solve(model, start, progress, tol)
     spent, slope = found.iterations, THRUST_SLOPE
-    while thrust is not None and found.converged and abs(thrust - found.CT) > CLOSE * thrust and spent < MOST_ALONE:
+    if thrust is None or not found.converged:
+        return found, spent
+    for _ in range(MOST_PITCHES):
+        if abs(thrust - found.CT) < CLOSE * thrust:
+            break
         change = np.clip((thrust - found.CT) / slope, -FARTHEST, FARTHEST)
         new = solve(_pitched(model, found.model.operating.collective + change), found, progress, tol)
         spent += new.iterations
         if not new.converged:
-            break
-        slope = (new.CT - found.CT) / change
-        if thrust > new.CT and slope < STALLED:
+            return (new if new.interrupted else found), spent
+        slope = max((new.CT - found.CT) / change, STALLED)
+        if thrust > new.CT and slope == STALLED and change > TOLD:
             return replace(new, converged=False, why=_out_of_reach(thrust, new)), spent
         found = new
     return found, spent

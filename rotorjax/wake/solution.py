@@ -36,7 +36,7 @@ class Solution:
     model, state: the state belongs to this model; where `converged` is False it is the last point reached, with
     whatever washout or ground it had. why: one sentence. residual: rms distance that nodes move when the wake is passed
     once through its own velocities (several revolutions of transport). load_change: relative change of C_T in that
-    pass. iterations: Newton's, over all steps. wall_time_s includes compile_time_s.
+    pass. iterations: Newton's, over all steps. interrupted: by the user. wall_time_s includes compile_time_s.
 
     r, widths (R,): control points and panel widths. psi (K,); K = 1 where the wake is axisymmetric. dct_dr, inflow
     (positive down, climb included), circulation (over ΩR²): (K, R). CT, CP: T/(ρA(ΩR)²) and P/(ρA(ΩR)³) with CP =
@@ -67,6 +67,7 @@ class Solution:
     tip_vortex: Numbers
     tip_vortex_age: Numbers
     residuals: tuple[float, ...] = ()
+    interrupted: bool = False
 
     @property
     def unknowns(self) -> Unknowns:
@@ -99,7 +100,7 @@ NUMBERS = ("CT", "CP", "CP_induced", "CP_profile", "mean_inflow")
 jax.tree_util.register_dataclass(
     Solution,
     data_fields=["model", "state", "residual", "load_change", *ARRAYS, "tip_vortex_age", *NUMBERS],
-    meta_fields=["converged", "why", "iterations", "wall_time_s", "compile_time_s", "residuals"],
+    meta_fields=["converged", "why", "iterations", "wall_time_s", "compile_time_s", "residuals", "interrupted"],
 )
 
 
@@ -194,6 +195,7 @@ def read(model: FreeWake, x: Unknowns, search: Search, clock: Clock) -> Solution
         residual=displacement(change),
         load_change=abs(float(then) / numbers["CT"] - 1),
         iterations=search.iterations,
+        interrupted=search.interrupted,
         residuals=tuple(search.residuals),
         wall_time_s=wall,
         compile_time_s=compiling,

@@ -11,7 +11,7 @@ from wakes import COARSE
 
 import rotorjax as rj
 from rotorjax.errors import InputError
-from rotorjax.wake import field
+from rotorjax.wake import field, several_solution
 from rotorjax.wake.equilibrium import full_state, spread
 from rotorjax.wake.several import answer, evaluate, interference, leaked, several_wakes, velocity
 from rotorjax.wake.solution import told_of
@@ -146,6 +146,15 @@ def test_a_thrust_beyond_stall_is_told(uh60):
     assert not lost.converged
     assert "C_T = 0.03 is out of a rotor's reach" in lost.why
     assert 0.01 < lost.CT[0] < 0.016
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_a_lost_way_to_the_thrust_is_given_up_and_an_interrupt_ends_the_search(uh60, alone, monkeypatch, interrupted):
+    """From the last wake that was found all rotors are tried together; not where the user has ended it."""
+    answers = iter([alone, replace(alone, converged=False, interrupted=interrupted, why="ended")])
+    monkeypatch.setattr(several_solution, "solve", lambda *_: next(answers))
+    found, spent = several_solution._one_alone(alone.model, THRUST, None, None, 1e-7)
+    assert (found.converged, spent) == (not interrupted, 2 * alone.iterations)
 
 
 @pytest.mark.slow
