@@ -158,9 +158,13 @@ def several_wakes(
 
 def _each(name: str, values: ArrayLike, count: int) -> Float[Array, " N"]:
     """One number for each rotor; a lone number stands for all."""
-    found = array(values)
+    refused = refuse(name, f"be a number or {count} of them, all finite", shown(values))
+    try:
+        found = array(values)
+    except (TypeError, ValueError):  # words, lists of unlike lengths
+        raise refused from None
     if found.shape not in ((), (count,)) or (known(found) and not np.all(np.isfinite(found))):
-        raise refuse(name, f"be a number or {count} of them, all finite", shown(values))
+        raise refused
     return jnp.broadcast_to(found, (count,))
 
 

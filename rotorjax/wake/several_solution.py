@@ -245,7 +245,7 @@ def _one_alone(
 ) -> tuple[Solution, int]:
     """A rotor's wake, or the one closest to a thrust by the secant rule in its collective, and iterations in all."""
     if thrust is not None and start is not None:
-        model = _pitched(model, start.model.operating.collective)
+        model = _at_collective(model, start.model.operating.collective)
     found = solve(model, start, progress, tol)
     spent, slope = found.iterations, THRUST_SLOPE
     if thrust is None or not found.converged:
@@ -254,7 +254,7 @@ def _one_alone(
         if abs(thrust - found.CT) < CLOSE * thrust:
             break
         change = np.clip((thrust - found.CT) / slope, -FARTHEST, FARTHEST)
-        new = solve(_pitched(model, found.model.operating.collective + change), found, progress, tol)
+        new = solve(_at_collective(model, found.model.operating.collective + change), found, progress, tol)
         spent += new.iterations
         if not new.converged:
             return (new if new.interrupted else found), spent
@@ -273,7 +273,7 @@ def _out_of_reach(thrust: float, found: Solution) -> str:
     )
 
 
-def _pitched(model: FreeWake, collective: Any) -> FreeWake:
+def _at_collective(model: FreeWake, collective: Any) -> FreeWake:
     return eqx.tree_at(lambda m: m.operating.collective, model, jnp.asarray(collective))
 
 

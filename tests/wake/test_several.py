@@ -192,7 +192,8 @@ BAD = {
     "`places` must keep every disk above the ground": {"ground": rj.plane(0.1)},
     "`collectives_deg` must be a number or 2 of them": {"collectives_deg": [1.0, 2.0, 3.0]},
     "`tilts_deg` must be of shape": {"tilts_deg": [(3.0, 0.0)]},
-    "`thrusts` must be a number": {"thrusts": -0.01},
+    r"`thrusts` must be a number in \(0, 0.1\]": {"thrusts": -0.01},
+    "`thrusts` must be a number or 2 of them, all finite, but is .much": {"thrusts": "much"},
     "keep clear of the disk": {"surfaces": rj.wall(0.5, bottom=-1.0, top=1.0)},
     "`surfaces` must be made by": {"surfaces": "wall"},
 }
