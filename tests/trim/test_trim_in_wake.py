@@ -54,6 +54,17 @@ def told(cruise):
 
 
 @pytest.mark.slow
+def test_a_plain_flight_at_the_settings_of_users_is_found():
+    """An upright shaft in free air: it once stalled at 5e-6 (`benchmarks/anywhere.py --parts known` has others)."""
+    found = run(request("uh60", 0.00578, "freewake", 0.15))
+    assert found.converged, found.verdict
+    assert found.trimmed.outcome.residual < 1e-7
+    assert found.trimmed.p.model.settings == flight_settings(4)  # nothing damped
+    ideal = 0.00578**2 / (2 * np.hypot(0.15, 0.019))  # Glauert's, of a wing of the disk's span
+    assert 1 < numbers(found)["CP_induced"] / ideal < 1.5
+
+
+@pytest.mark.slow
 def test_forward_flight_is_trimmed(told):
     assert told["converged"]
     assert told["residual"] < 1e-7
