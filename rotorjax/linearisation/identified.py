@@ -6,10 +6,11 @@ about a hover or a flight: deviations per radian of azimuth, in rotor units. Pit
 = 16/45π and, of a hover's λ, K = diag(4λ, λ, λ). What thrust and moments do to the blades, and the blades and the
 inflow to them, is the rotor's own linear model with Pitt and Peters' inflow, in which only M and K are changed. They
 are fitted to steps of the linear rotor in its free wake over one revolution, thrust, flapping and hub moments together,
-by Levenberg and Marquardt's method with exact derivatives through the matrix exponential. Over a revolution and not on
+by least squares in a trust region with exact derivatives through the matrix exponential. Over a revolution and not on
 iω, because a hovering wake grows.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -17,10 +18,10 @@ from typing import NamedTuple, Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix
 import xarray as xr
 from jax.scipy.linalg import expm
 from jaxtyping import Array, Float
+from scipy.optimize import least_squares
 
 from rotorjax.errors import InputError
 from rotorjax.inflow.interface import DiskLoads
@@ -36,6 +37,8 @@ INFLOW = ("lambda_0", "lambda_1c", "lambda_1s")
 NAMES = ("m_0", "m_c", "m_s", "k_00", "k_0c", "k_0s", "k_c0", "k_cc", "k_cs", "k_s0", "k_sc", "k_ss")
 TIMES = np.linspace(0, 2 * np.pi, 49)
 """Of the steps, rad."""
+MOST_FITS = 200
+"""Inflows tried in a fit; a few tens are enough."""
 FLOOR = 0.05
 """Share of an output's largest response, over the inputs, below which one counts as absent."""
 
@@ -84,16 +87,27 @@ def identified(
 ) -> Identified:
     """Fit an inflow. rotor: linear model of the same flight with Pitt and Peters' inflow, all states. start: `own`.
 
-    Raises InputError where one of the models lacks a name of INPUTS, OUTPUTS or INFLOW.
+    A search that does not come to its end gives the best that it met, with a warning.
+
+    Raises InputError where one of the models lacks a name of INPUTS, OUTPUTS or INFLOW, or the model's steps are no
+    numbers.
     """
     target = target_of(model, rotor)
 
-    def left(z: Array, target: Target) -> Array:
+    @jax.jit
+    def left(z: Array) -> Array:
         return ((steps(rotor, start, _moved(z, start)) - target.steps) * target.weight).ravel()
 
-    solver = optimistix.LevenbergMarquardt(rtol=1e-6, atol=1e-8)
-    z = optimistix.least_squares(left, solver, jnp.zeros(12), target, max_steps=200).value
-    found = _moved(z, start)
+    slope = jax.jit(jax.jacfwd(left))
+    calls = [lambda z, of=of: np.asarray(of(z)) for of in (left, slope)]
+    fit = least_squares(calls[0], np.zeros(12), calls[1], ftol=1e-10, gtol=1e-12, max_nfev=MOST_FITS)
+    if not fit.success:
+        warnings.warn(
+            f"the inflow identified at advance ratio {advance:g}, height {height:g} is the best of {fit.nfev} that "
+            "were tried, and the search had not come to its end: look at its error before you fly with it",
+            stacklevel=2,
+        )
+    found = _moved(jnp.asarray(fit.x), start)
     errors = [error_of(inflow, start, target, rotor) for inflow in (found, start)]
     return Identified(found, errors[0], start, errors[1], advance, height)
 
@@ -117,7 +131,7 @@ class Target(NamedTuple):
 
 
 def target_of(model: Stepped, rotor: LinearModel) -> Target:
-    """Steps of a free wake's model. Raises InputError where a name is missing."""
+    """Steps of a free wake's model. Raises InputError where a name is missing or a step is no number."""
     for what, names, owned in (
         ("inputs", INPUTS, (model.inputs, rotor.inputs)),
         ("outputs", OUTPUTS, (model.outputs, rotor.outputs)),
@@ -129,6 +143,8 @@ def target_of(model: Stepped, rotor: LinearModel) -> Target:
             )
     rows, columns = [model.outputs.index(n) for n in OUTPUTS], [model.inputs.index(n) for n in INPUTS]
     truth = model.step(TIMES)[:, rows][:, :, columns]
+    if not np.all(np.isfinite(truth)):
+        raise InputError("Argument `model` must have finite steps within a revolution, but has not: it grows too fast")
     top = np.abs(truth).max(axis=0)
     there = top > FLOOR * top.max(axis=1, keepdims=True)
     return Target(jnp.asarray(truth), jnp.asarray(np.where(there, 1 / np.where(there, top, 1.0), 0.0)))

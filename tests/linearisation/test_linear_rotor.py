@@ -235,7 +235,7 @@ def test_harmonics_of_what_does_not_change_are_refused(periodic):
         flight.held_harmonics(periodic, 4)
 
 
-def test_an_inflow_is_identified_from_steps(hover, linear, fast, in_flight):
+def test_an_inflow_is_identified_from_steps(hover, linear, fast, in_flight, monkeypatch):
     """Steps of a rotor whose inflow has known constants give them back, and Pitt and Peters' own are the start."""
     start, flow = identified.own(hover), float(np.mean(hover.z.inflow, axis=0)[0])
     np.testing.assert_allclose(start.stiffness, np.diag([4 * flow, flow, flow]), atol=1e-9)
@@ -255,6 +255,11 @@ def test_an_inflow_is_identified_from_steps(hover, linear, fast, in_flight):
         np.testing.assert_allclose(found[-1].inflow.mass, true.mass, rtol=1e-3)
         np.testing.assert_allclose(found[-1].inflow.stiffness, true.stiffness, atol=1e-3 * true.stiffness.max())
         assert found[-1].error < 1e-4 < found[-1].pitt_peters_error
+    monkeypatch.setattr(identified, "MOST_FITS", 2)
+    with pytest.warns(UserWarning, match="at advance ratio 0.3, height 1 is the best of 2 that were tried"):
+        assert identified.identified(wake, rotor, start, 0.3, 1.0).error < found[-1].pitt_peters_error
+    with pytest.raises(InputError, match="must have finite steps"):
+        identified.identified(replace(wake, a=np.full_like(wake.a, np.nan)), rotor, start)
     with pytest.raises(InputError, match="has no lambda_0"):
         identified.identified(wake, replace(linear, states=tuple(f"x[{k}]" for k in range(linear.order))), start)
 
