@@ -29,6 +29,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from rotorjax.io.atomic import json_text, make_folder
@@ -130,7 +131,7 @@ def stepped(base, names):
 def straight_damper(p):
     """The rotor with a linear lag damper: one line from end to end of its table."""
     rate, end = p.blade.damper_rate, p.blade.damper_force[-1, 0]
-    return eqx.tree_at(lambda q: q.blade.damper_force, p, with_slopes(rate, rate * end / rate[-1]))
+    return eqx.tree_at(lambda q: q.blade.damper_force, p, with_slopes(rate, rate * end / rate[-1], jnp))
 
 
 def wake_without_kinks(trimmed):
@@ -204,7 +205,7 @@ def table_rows(speeds, heights, held, folder):
             flown[advance, height] = near
             found.append(identify.fitted(average(near.small.model), near.request))
             print(f"{identify.lines(found[-1:])[0]}; {took:.0f} s", flush=True)
-    identify.write(found, folder)
+            identify.write(found, folder)  # as far as it is
     data = identified.table(found)
     print(identified.text(data))
     there = {place: in_wake(*place, near) for place in held}

@@ -93,6 +93,7 @@ def hover_inflow(thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, 
     return induced_inflow(thrust, inputs.climb, wind @ wind)
 
 
+@jax.jit
 def induced_inflow(
     thrust: Float[Array, ""], climb: Float[Array, ""] | float, square: Float[Array, ""] | float = 0.0
 ) -> Float[Array, ""]:

@@ -11,16 +11,18 @@ Centrifugal, Coriolis and gyroscopic moments are all in it. Rotor units: divided
 ρΩ²R⁵.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
+from rotorjax.checks import array, known
 from rotorjax.errors import InputError
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor.geometry import Rotor
+from rotorjax.rotor.geometry import Hinge, Rotor
 from rotorjax.rotor.hub import TurningFrame
 from rotorjax.rotor.monotone import read, with_slopes
 
@@ -84,9 +86,7 @@ def blade_of(rotor: Rotor, operating: OperatingPoint, gravity: float = GRAVITY) 
     stiffness = inertia * omega**2
     rate = force = None
     if hinge.damper_rate is not None and hinge.damper_force is not None:
-        rate = jnp.concatenate([-hinge.damper_rate[:0:-1], hinge.damper_rate]) / omega
-        force = jnp.concatenate([-hinge.damper_force[:0:-1], hinge.damper_force]) / stiffness
-        force = with_slopes(rate, force)
+        rate, force = _damper(hinge, omega, stiffness)
     return Blade(
         offset=hinge.offset / radius,
         mass=hinge.blade_mass * radius**2 / inertia,
@@ -101,6 +101,16 @@ def blade_of(rotor: Rotor, operating: OperatingPoint, gravity: float = GRAVITY) 
         damper_rate=rate,
         damper_force=force,
     )
+
+
+def _damper(hinge: Hinge, omega: Any, stiffness: Any) -> tuple[Array, Array]:
+    """Rates over Ω, both ways, and forces over IΩ² with their slopes; of numbers without anything compiled."""
+    values = hinge.damper_rate, hinge.damper_force, omega, stiffness
+    xp = np if known(values) else jnp
+    half_rate, half_force, omega, stiffness = map(xp.asarray, values)
+    rate, force = (xp.concatenate([-half[:0:-1], half]) for half in (half_rate, half_force))
+    rate = rate / omega
+    return array(rate), array(with_slopes(rate, force / stiffness, xp))
 
 
 def damper_moment(blade: Blade, lag_rate: Float[Array, ""]) -> Float[Array, ""]:

@@ -36,11 +36,14 @@ def hermite(x: Float[Array, "*n"], nodes: Float[Array, " N"]) -> tuple[Int[Array
     return i, basis.reshape(*basis.shape[:-1], 2, 2)
 
 
-def with_slopes(x: Float[Array, " N"], y: Float[Array, " N"]) -> Float[Array, "N 2"]:
-    """Values and slopes at the nodes; at both ends the slope of the piece there, with which `read` goes on."""
-    ends = jnp.diff(y)[jnp.array([0, -1])] / jnp.diff(x)[jnp.array([0, -1])]
-    inner = inner_slopes(x, y[:, None], jnp)[:, 0]
-    return jnp.stack([y, jnp.concatenate([ends[:1], inner, ends[1:]])], axis=-1)
+def with_slopes(x: Any, y: Any, xp: Any) -> Any:
+    """Values and slopes [N, 2] at nodes x [N]; at both ends the slope of the piece there, with which `read` goes on.
+
+    xp: numpy, or jax's.
+    """
+    steps = xp.diff(y) / xp.diff(x)
+    inner = inner_slopes(x, y[:, None], xp)[:, 0]
+    return xp.stack([y, xp.concatenate([steps[:1], inner, steps[-1:]])], axis=-1)
 
 
 def read(at: Float[Array, "*n"], x: Float[Array, " N"], table: Float[Array, "N 2"]) -> Float[Array, "*n"]:
