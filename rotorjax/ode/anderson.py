@@ -93,12 +93,15 @@ def anderson(
         )
     flat, unravel = flatten(x0)
     args = traceable(args)
+    # compiled ahead, for jax traces a program that holds a primitive of hijax anew in every call
+    passed = None if linear is not None else flat_residual.lower(g, unravel, flat, args).compile()
 
     def residual(x: np.ndarray) -> np.ndarray:
         point = jnp.asarray(x, flat.dtype)
         if linear is not None:
             return np.asarray(linear.at(g, unravel, point, args)[0])
-        return np.asarray(flat_residual(g, unravel, point, args)) - x
+        assert passed is not None
+        return np.asarray(passed(g, unravel, point, args)) - x
 
     with Log("anderson", attainable(tol, flat.dtype), max_iterations, progress) as log:
         _iterate(log, residual, measure, np.asarray(flat), _Window(window, flat.size), mixing, safeguard)

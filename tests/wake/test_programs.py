@@ -3,6 +3,7 @@
 Counts, not seconds, so that no busy machine upsets them. A fusion costs about 50 ms to compile, whatever it does.
 """
 
+import cProfile
 import re
 
 import equinox as eqx
@@ -49,6 +50,21 @@ def test_a_wake_takes_few_programs(uh60, coarse, programs):
     programs.clear()
     assert solve(high, hover).converged
     assert not programs
+
+
+def misses(call):
+    """How many calls of jitted programs jax could not send off at once, but looked at in Python and traced anew."""
+    profile = cProfile.Profile()
+    profile.runcall(call)
+    return sum(row.callcount for row in profile.getstats() if getattr(row.code, "co_name", "") == "cache_miss")
+
+
+def test_a_wake_solved_again_is_not_traced_again(uh60, coarse):
+    """As jax does with every call of a program that holds a primitive of hijax (kernel_rule.py)."""
+    assert misses(lambda: jax.jit(lambda x: x + 1)(1.0)) > 0
+    hover = free_wake(*uh60, None, coarse)
+    assert solve(hover).converged
+    assert misses(lambda: solve(hover)) == 0
 
 
 @pytest.mark.parametrize(("ground", "most"), [(None, 105), (plane(1.0), 140)], ids=["free", "level"])
