@@ -79,13 +79,13 @@ def _trimmed(chosen: argparse.Namespace) -> int:
             if isinstance(one, Result):
                 lost.append(one)
                 continue
-            progress("identified inflow", 0.0)
             known.append(one)
-            small += identify.of_flights([one])
             if len(requests) == 1:
                 trim_output.write(one, out, chosen.time)
             else:
                 schedule.write(known, out, chosen.time)
+            progress("identified inflow", 0.0)
+            small += identify.of_flights([one])
             identify.write(small, out)
     for one in lost:
         where = "" if one.request.height is None else f", height {one.request.height:g}"

@@ -144,7 +144,10 @@ def target_of(model: Stepped, rotor: LinearModel) -> Target:
     rows, columns = [model.outputs.index(n) for n in OUTPUTS], [model.inputs.index(n) for n in INPUTS]
     truth = model.step(TIMES)[:, rows][:, :, columns]
     if not np.all(np.isfinite(truth)):
-        raise InputError("Argument `model` must have finite steps within a revolution, but has not: it grows too fast")
+        raise InputError(
+            "Argument `model` must have finite steps within a revolution, but has not: look for NaN in its matrices "
+            "and for modes that outgrow the numbers"
+        )
     top = np.abs(truth).max(axis=0)
     there = top > FLOOR * top.max(axis=1, keepdims=True)
     return Target(jnp.asarray(truth), jnp.asarray(np.where(there, 1 / np.where(there, top, 1.0), 0.0)))
