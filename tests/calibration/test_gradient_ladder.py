@@ -115,6 +115,17 @@ def field_of(v):
     )
 
 
+def inflow_of(v):
+    """Inflow of loads under a contracting wake, from the loads and from unit states."""
+    made, tau = contracting(v), v[5:]
+    unit = model.unit_states(made)
+    state = model.steady_state(made, tau, 0.01, unit)
+    a = model.with_ground(tau * model.answer_means(made), made).a
+    return jnp.concatenate(
+        [jnp.ravel(model.inflow(state, R, PSI[:2], made)), model.unit_inflow(made, unit, R, 0.3 * R).T @ a]
+    )
+
+
 def state_of(v) -> FiniteState:
     return FiniteState(v[:M], v[M : M + G])
 
@@ -312,16 +323,11 @@ RUNGS = [
             "model.rotor_means",
             "model.unit_states",
             "model.rotor_flow",
+            "model.answer_means",
+            "model.unit_inflow",
+            "model.with_ground",
         ),
-        lambda v: model.inflow(model.steady_state(contracting(v), v[5:], 0.01), R, PSI[:2], contracting(v)),
-        CONTRACTING,
-    ),
-    Rung(
-        ("model.answer_means", "model.unit_inflow", "model.with_ground"),
-        lambda v: (
-            model.unit_inflow(contracting(v), model.unit_states(contracting(v)), R, 0.3 * R).T
-            @ model.with_ground(v[5:] * model.answer_means(contracting(v)), contracting(v)).a
-        ),
+        inflow_of,
         CONTRACTING,
     ),
     Rung(
@@ -455,13 +461,12 @@ def test_ladder(rung):
     flat = lambda v: jnp.ravel(rung.function(v))  # noqa: E731
 
     @partial(jax.jit, compiler_options=QUICK)
-    def climb(points, moved):
-        return jax.vmap(flat)(moved), *jax.vmap(both_ways(flat))(points)
+    def climb(moved):
+        return jax.vmap(flat)(moved), *both_ways(flat)(moved[0])
 
     moved = jnp.concatenate([points[:, None], points[:, None] + moves, points[:, None] - moves], axis=1)
-    count, width = points.shape
-    every, forward, reverse = (np.asarray(v) for v in climb(points, moved.reshape(-1, width)))
-    every = every.reshape(count, 2 * width + 1, -1)
+    width = points.shape[1]
+    every, forward, reverse = (np.stack(v) for v in zip(*map(climb, moved), strict=True))  # point by point
     np.testing.assert_allclose(every[0, 0], flat(points[0]), rtol=1e-11, atol=1e-14)  # one point, not under jit
     for i, name in enumerate(names):
         values, ahead, behind = every[i, 0], every[i, 1 : width + 1], every[i, width + 1 :]
