@@ -67,7 +67,7 @@ def save(figure: Figure, stem: str | Path, formats: Sequence[str] = ("png", "pdf
     paths = [Path(f"{stem}.{ending}") for ending in formats]
     with style():
         figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # laid out once, not again for each format
+    figure.set_layout_engine(None)  # laid out once: with any engine each format is drawn twice
     for path in paths:
         save_file(figure, path)
     return paths
