@@ -10,6 +10,9 @@ Ellipsoidal frame (Appendix A): x forward, y to starboard, z down. `to_ellipsoid
 Inflow is positive down through the disk: λ = −v_z/ΩR.
 """
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -19,6 +22,7 @@ def to_ellipsoidal(xyz: Float[Array, "*n 3"]) -> Float[Array, "*n 3"]:
     return xyz * jnp.array([-1.0, 1.0, -1.0], xyz.dtype)
 
 
+@partial(jax.jit, inline=True)
 def rotate_about_shaft(xyz: Float[Array, "*n 3"], angle: Float[Array, "*#n"]) -> Float[Array, "*n 3"]:
     """Turn vectors by `angle` (rad) about the shaft, counter-clockwise seen from above."""
     c, s = jnp.cos(angle), jnp.sin(angle)
@@ -26,6 +30,7 @@ def rotate_about_shaft(xyz: Float[Array, "*n 3"], angle: Float[Array, "*#n"]) ->
     return jnp.stack([c * x - s * y, s * x + c * y, z], axis=-1)
 
 
+@partial(jax.jit, inline=True)
 def disk_points(r: Float[Array, "*n"], psi: Float[Array, "*n"]) -> Float[Array, "*n 3"]:
     """Points of the disk at radius r (over R) and azimuth psi (rad), in the hub frame."""
     return jnp.stack([r * jnp.cos(psi), r * jnp.sin(psi), jnp.zeros_like(r * psi)], axis=-1)

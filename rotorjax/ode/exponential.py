@@ -7,6 +7,7 @@ keeps 0.75 of it in a step in place of 0.07.
 """
 
 from collections.abc import Callable
+from functools import partial
 from math import factorial
 from typing import Any, NamedTuple
 
@@ -43,6 +44,7 @@ def phis(z: Float[Array, ""]) -> tuple[Float[Array, ""], Float[Array, ""], Float
     return one, two, three
 
 
+@partial(jax.jit, inline=True)
 def weights(z: Float[Array, ""]) -> Weights:
     """The method's weights for z = −κΔt."""
     half, (one, two, three) = phis(z / 2)[0] / 2, phis(z)

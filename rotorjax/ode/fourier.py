@@ -5,6 +5,9 @@ openxla/xla 46347 (jaxlib 0.11) it shares its work out to the threads that run t
 where all of them wait, as with two cores and two transforms at a time, nobody works.
 """
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Complex, Float
@@ -43,6 +46,7 @@ def fourier_interpolation(nodes: int, angles: Float[np.ndarray, " N"]) -> Float[
     return kernel / nodes
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def fourier_coefficients(values: Array, axis: int = 0) -> Array:
     """Σₖ vₖ e^(−ipψₖ) for p = 0 … K − 1 along an axis of K nodes, as `numpy.fft.fft`.
 
@@ -52,18 +56,21 @@ def fourier_coefficients(values: Array, axis: int = 0) -> Array:
     return _along(_waves(values.shape[axis]), values, axis)
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def fourier_values(coefficients: Array, axis: int = 0) -> Array:
     """Values, complex, at the K nodes of all K coefficients along an axis, as `numpy.fft.ifft`."""
     nodes = coefficients.shape[axis]
     return _along(_waves(nodes).conj() / nodes, coefficients, axis)
 
 
+@partial(jax.jit, static_argnames="axis", inline=True)
 def half_coefficients(values: Array, axis: int = 0) -> Array:
     """The coefficients 0 … K/2 of real values, which are all: the others are their conjugates, as `numpy.fft.rfft`."""
     nodes = values.shape[axis]
     return _along(_waves(nodes)[: nodes // 2 + 1], values, axis)
 
 
+@partial(jax.jit, static_argnames=("nodes", "axis"), inline=True)
 def half_values(coefficients: Array, nodes: int, axis: int = 0) -> Array:
     """Real values at the nodes of the coefficients 0 … K/2, as `numpy.fft.irfft`."""
     number = np.arange(nodes // 2 + 1)

@@ -66,7 +66,7 @@ def linearise(
     state's.
     """
     times, states = _sampled(orbit, nodes)
-    start = jax.tree.map(lambda leaf: leaf[0], states)
+    start = jax.tree.map(lambda leaf: np.asarray(leaf)[0], states)
     u, p = traceable((u, p))
     slope, result = eqx.filter_eval_shape(lambda *a: (rhs(*a), output(*a)), times[0], start, u, p)
     require_like(slope, start, "rhs(t, x, u, p)")
@@ -75,15 +75,15 @@ def linearise(
     flat_u, of_input = flatten(u, "u")
     of_state = ravel_pytree(start)[1]
     joint = _Joint(rhs, output, of_state, of_input, tuple(map(int, chosen)))
-    flat_x = jax.vmap(lambda x: ravel_pytree(x)[0])(states)
+    flat_x = np.concatenate([np.asarray(leaf).reshape(times.size, -1) for leaf in jax.tree.leaves(states)], axis=1)
     n, rows = len(x_names), np.concatenate([np.arange(len(x_names)), len(x_names) + kept])
-    z = jnp.concatenate([flat_x, jnp.tile(flat_u[chosen].astype(flat_x.dtype), (times.size, 1))], axis=1)
+    z = np.concatenate([flat_x, np.tile(np.asarray(flat_u, flat_x.dtype)[chosen], (times.size, 1))], axis=1)
     if derivative is None:
         whole, values = _sweep(joint, z, times, (flat_u, p), rows, chunk, progress)
     else:
         whole, values = _given(derivative, times, states, rows, np.concatenate([np.arange(n), n + chosen]))
     names = (x_names, tuple(u_names[i] for i in chosen), tuple(y_names[i] for i in kept))
-    about = (np.asarray(flat_x), np.asarray(flat_u)[chosen], values[:, n:])
+    about = (flat_x, np.asarray(flat_u)[chosen], values[:, n:])
     return _model(np.asarray(times), float(orbit.period), whole, about, names, units)
 
 

@@ -1,5 +1,7 @@
 """A periodic orbit: states at equally spaced times of one period, and how well it was found."""
 
+from functools import partial
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -41,13 +43,23 @@ class Orbit(eqx.Module):
     @property
     def start(self) -> PyTree:
         """State at t[0]."""
-        return jax.tree.map(lambda leaf: leaf[0], self.x)
+        return _first(self.x)
 
     def at(self, times: ArrayLike) -> PyTree:
         """States at any concrete times (N,), by trigonometric interpolation; every leaf gets a leading axis of N."""
         angle = 2 * np.pi * (np.atleast_1d(np.asarray(times, float)) - float(self.t[0])) / float(self.period)
         table = fourier_interpolation(self.nodes, angle)
-        return jax.tree.map(lambda leaf: jnp.tensordot(jnp.asarray(table, leaf.dtype), leaf, axes=1), self.x)
+        return _combined(self.x, table)
+
+
+@partial(jax.jit, inline=True)
+def _first(x: PyTree) -> PyTree:
+    return jax.tree.map(lambda leaf: leaf[0], x)
+
+
+@partial(jax.jit, inline=True)
+def _combined(x: PyTree, table: Float[Array, "N K"]) -> PyTree:
+    return jax.tree.map(lambda leaf: jnp.tensordot(table.astype(leaf.dtype), leaf, axes=1), x)
 
 
 def make_orbit(t0: ArrayLike, x: PyTree, period: ArrayLike, outcome: Outcome) -> Orbit:

@@ -11,9 +11,11 @@ out by 14°, where the lift is set by separation, which the rule knows nothing o
 measured drag rise the result is to be trusted below the critical Mach number only.
 """
 
+from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -57,6 +59,7 @@ class AirfoilTable(eqx.Module):
         return self.nodes[:, :, 1, 0, 0]
 
 
+@partial(jax.jit, inline=True)
 def lift_drag(
     table: AirfoilTable, alpha: Float[Array, "*n"], mach: Float[Array, "*#n"]
 ) -> tuple[Float[Array, "*n"], Float[Array, "*n"]]:
@@ -106,7 +109,7 @@ def airfoil_table(
     alpha = np.deg2rad(alpha_deg)
     # −π and π are the wrap's own ends; deg2rad may miss them by a rounding.
     alpha[0], alpha[-1] = -np.pi, np.pi
-    nodes = xp.stack([_with_slopes(alpha, mach, c, xp) for c in (cl, cd)], axis=2)
+    nodes = _nodes(alpha, mach, cl, cd, np) if known(cl, cd) else _traced_nodes(alpha, mach, cl, cd)
     return AirfoilTable(name, bool(prandtl_glauert), *map(array, (alpha, mach, nodes)))
 
 
@@ -132,6 +135,14 @@ def _attached(alpha):
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
+def _nodes(alpha: Any, mach: Any, cl: Any, cd: Any, xp: Any) -> Any:
+    """Both coefficients `_with_slopes`, [N, C, (cl, cd), order α, order M]."""
+    return xp.stack([_with_slopes(alpha, mach, c, xp) for c in (cl, cd)], axis=2)
+
+
+_traced_nodes = jax.jit(partial(_nodes, xp=jnp), inline=True)
+
+
 def _with_slopes(alpha: np.ndarray, mach: np.ndarray, values: Any, xp: Any) -> Any:
     """Values and node derivatives, [N, C, order α, order M]; xp: numpy, or jax's for traced values."""
     in_alpha, in_mach = _slopes_alpha(alpha, values, xp), _slopes_mach(mach, values, xp)
@@ -142,7 +153,7 @@ def _with_slopes(alpha: np.ndarray, mach: np.ndarray, values: Any, xp: Any) -> A
 def _slopes_alpha(alpha: np.ndarray, values: Any, xp: Any) -> Any:
     """Slopes in α [N, C] of a coefficient that goes round: the first row's neighbours are the second and the last."""
     turn = 2 * np.pi
-    round_ = np.concatenate([[alpha[-2] - turn], alpha, [alpha[1] + turn]])
+    round_ = xp.concatenate([alpha[-2:-1] - turn, alpha, alpha[1:2] + turn])
     return inner_slopes(round_, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
 
 

@@ -6,9 +6,11 @@ same), it passes through every published number, and it is exactly differentiabl
 the edge of a trim tab, is a pair of close stations.
 """
 
+from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -36,9 +38,14 @@ class Table(eqx.Module):
         Every interval gives its slope times the way that r has come along it: `jnp.interp` looks for the interval in a
         loop, which takes ten times as long to compile. On a station the derivative is the mean of both sides.
         """
-        widths = jnp.diff(self.stations)
-        come = jnp.clip(jnp.asarray(r)[..., None] - self.stations[:-1], 0, widths)
-        return self.values[0] + jnp.sum(come * (jnp.diff(self.values) / widths), axis=-1)
+        return _read(self.stations, self.values, jnp.asarray(r))
+
+
+@partial(jax.jit, inline=True)
+def _read(stations: Float[Array, " S"], values: Float[Array, " S"], r: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    widths = jnp.diff(stations)
+    come = jnp.clip(r[..., None] - stations[:-1], 0, widths)
+    return values[0] + jnp.sum(come * (jnp.diff(values) / widths), axis=-1)
 
 
 class Hinge(eqx.Module):

@@ -5,8 +5,10 @@ doi:10.1137/0717021). Straight pieces have a kink at every node, about which not
 spline overshoots steps.
 """
 
+from functools import partial
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
@@ -46,6 +48,7 @@ def with_slopes(x: Any, y: Any, xp: Any) -> Any:
     return xp.stack([y, xp.concatenate([steps[:1], inner, steps[-1:]])], axis=-1)
 
 
+@partial(jax.jit, inline=True)
 def read(at: Float[Array, "*n"], x: Float[Array, " N"], table: Float[Array, "N 2"]) -> Float[Array, "*n"]:
     """Of `with_slopes`, elementwise; straight beyond the nodes."""
     within = jnp.clip(at, x[0], x[-1])

@@ -6,6 +6,7 @@ Eq. 13 is solved exactly for the positions they produce (transport.py). On that 
 products, with no further preconditioner.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import equinox as eqx
@@ -110,6 +111,7 @@ def displacement(moved: Unknowns) -> float:
     return float(np.sqrt(np.mean(np.sum(nodes**2, axis=1))))
 
 
+@partial(jax.jit, static_argnames="slices", inline=True)
 def spread(x: Unknowns, slices: int) -> Unknowns:
     """Repeat an axisymmetric wake (K = 1) over K slices."""
     return jax.tree.map(lambda a: jnp.repeat(a, slices, axis=0) if a.shape[0] == 1 else a, x)

@@ -12,10 +12,14 @@ power. What the other place adds decides the lift only; it is geometry of the bl
 of a flat wake that leaves straight to the rear; half a chord of curvature is of the next order.
 """
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
+@partial(jax.jit, inline=True)
 def chord_downwash(
     stations: Float[Array, " R"], edges: Float[Array, " R+1"], behind: Float[Array, " R"]
 ) -> Float[Array, "R R"]:

@@ -11,9 +11,11 @@ frame: x outboard along the blade, y in the direction of rotation, z up. One lay
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
@@ -252,5 +254,6 @@ def azimuths(state: WakeState, psi: float | Float[Array, ""] = 0.0) -> Float[Arr
     return psi + 2 * jnp.pi / k * jnp.arange(k)
 
 
+@partial(jax.jit, inline=True)
 def _stretch(inner, theta):
     return inner + (1 - inner) * 0.5 * (1 - jnp.cos(jnp.asarray(theta)))

@@ -22,6 +22,7 @@ The tip vortex starts at the mean place of a short stretch of the last row, `rel
 of that row will not do: its edge has begun to roll up, and the point moves on with every panel that resolves it.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -42,12 +43,14 @@ class Release(NamedTuple):
     strength: Float[Array, " F"]
 
 
+@partial(jax.jit, inline=True)
 def trailers(gamma: Float[Array, "R ..."]) -> Float[Array, "R+1 ..."]:
     """Strength γ_i = Γ_{i−1} − Γ_i of the trailers between panels of strength Γ; they add up to zero."""
     edge = jnp.zeros_like(gamma[:1])
     return -jnp.diff(jnp.concatenate([edge, gamma, edge]), axis=0)
 
 
+@partial(jax.jit, inline=True)
 def tip_share(model: FreeWake, gamma: Float[Array, " R"]) -> Float[Array, " R+1"]:
     """W_i: the share of each trailer that goes into the tip vortex, rising from 0 at the root to 1 at the tip."""
     outer = jax.nn.sigmoid((model.stations - 0.6) / 0.03)
@@ -58,6 +61,7 @@ def tip_share(model: FreeWake, gamma: Float[Array, " R"]) -> Float[Array, " R+1"
     return jnp.concatenate([jnp.zeros(1, weight.dtype), jnp.cumsum(weight)])
 
 
+@partial(jax.jit, inline=True)
 def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array, " R"]) -> Release:
     """Start points and strengths of the far filaments from the last row of the near wake and its ring strengths."""
     settings, inboard = model.settings, model.settings.inboard
@@ -109,6 +113,7 @@ def _weights(
     return unit[0] + ramps(x, nodes, beyond) @ np.diff(unit, axis=0)
 
 
+@partial(jax.jit, static_argnames="beyond", inline=True)
 def ramps(x: Float[Array, "*n"], nodes: Float[Array, " G"], beyond: bool = False) -> Float[Array, "*n G-1"]:
     """How far each x has come along each interval between rising nodes: 0 before it, 1 behind it.
 
