@@ -41,7 +41,7 @@ import pytest
 from rotorjax.device import host_threads
 
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
-MOST_MAPPINGS = 20_000  # about 3 GB of programs and what they hold
+MOST_MAPPINGS = 32_000  # about 5 GB of programs and what they hold
 SHORTEST = 0.1  # seconds of compilation that are worth a file
 
 gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other

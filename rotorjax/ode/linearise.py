@@ -137,7 +137,7 @@ def _given(
 
 
 def _sweep(
-    joint: _Joint, z: Array, times: Array, args: tuple, rows: np.ndarray, chunk: int, progress: bool
+    joint: _Joint, z: np.ndarray, times: Array, args: tuple, rows: np.ndarray, chunk: int, progress: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Chosen rows of the Jacobian and of the value at every time."""
     whole = np.empty((times.size, rows.size, z.shape[1]), z.dtype)
