@@ -109,7 +109,8 @@ def airfoil_table(
     alpha = np.deg2rad(alpha_deg)
     # −π and π are the wrap's own ends; deg2rad may miss them by a rounding.
     alpha[0], alpha[-1] = -np.pi, np.pi
-    nodes = _nodes(alpha, mach, cl, cd, np) if known(cl, cd) else _traced_nodes(alpha, mach, cl, cd)
+    # differences in float64: in single precision fine steps at large angles would lose their digits
+    nodes = (_nodes if xp is np else _traced_nodes)(np.diff(alpha), np.diff(mach), cl, cd)
     return AirfoilTable(name, bool(prandtl_glauert), *map(array, (alpha, mach, nodes)))
 
 
@@ -135,32 +136,31 @@ def _attached(alpha):
     return t**3 * (10 - 15 * t + 6 * t**2)
 
 
-def _nodes(alpha: Any, mach: Any, cl: Any, cd: Any, xp: Any) -> Any:
-    """Both coefficients `_with_slopes`, [N, C, (cl, cd), order α, order M]."""
-    return xp.stack([_with_slopes(alpha, mach, c, xp) for c in (cl, cd)], axis=2)
+def _nodes(d_alpha: Any, d_mach: Any, cl: Any, cd: Any, xp: Any = np) -> Any:
+    """Both coefficients `_with_slopes`, [N, C, (cl, cd), order α, order M]; d_alpha, d_mach: between the nodes."""
+    return xp.stack([_with_slopes(d_alpha, d_mach, c, xp) for c in (cl, cd)], axis=2)
 
 
 _traced_nodes = jax.jit(partial(_nodes, xp=jnp), inline=True)
 
 
-def _with_slopes(alpha: np.ndarray, mach: np.ndarray, values: Any, xp: Any) -> Any:
+def _with_slopes(d_alpha: Any, d_mach: Any, values: Any, xp: Any) -> Any:
     """Values and node derivatives, [N, C, order α, order M]; xp: numpy, or jax's for traced values."""
-    in_alpha, in_mach = _slopes_alpha(alpha, values, xp), _slopes_mach(mach, values, xp)
-    cross = _slopes_mach(mach, in_alpha, xp)
+    in_alpha, in_mach = _slopes_alpha(d_alpha, values, xp), _slopes_mach(d_mach, values, xp)
+    cross = _slopes_mach(d_mach, in_alpha, xp)
     return xp.stack([xp.stack([values, in_mach], -1), xp.stack([in_alpha, cross], -1)], -2)
 
 
-def _slopes_alpha(alpha: np.ndarray, values: Any, xp: Any) -> Any:
+def _slopes_alpha(d_alpha: Any, values: Any, xp: Any) -> Any:
     """Slopes in α [N, C] of a coefficient that goes round: the first row's neighbours are the second and the last."""
-    turn = 2 * np.pi
-    round_ = xp.concatenate([alpha[-2:-1] - turn, alpha, alpha[1:2] + turn])
-    return inner_slopes(round_, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
+    widths = xp.concatenate([d_alpha[-1:], d_alpha, d_alpha[:1]])
+    return inner_slopes(widths, xp.concatenate([values[-2:-1], values, values[1:2]]), xp)
 
 
-def _slopes_mach(mach: np.ndarray, values: Any, xp: Any) -> Any:
+def _slopes_mach(d_mach: Any, values: Any, xp: Any) -> Any:
     """Slopes in M [N, C]: zero at the ends, so that the constant beyond them joins the table without a kink."""
     zero = xp.zeros_like(values[:, :1])
-    return xp.concatenate([zero, inner_slopes(mach, values.T, xp).T, zero], axis=1)
+    return xp.concatenate([zero, inner_slopes(d_mach, values.T, xp).T, zero], axis=1)
 
 
 def _coefficient(label: str, values: Any, shape: tuple[int, int]) -> Any:

@@ -43,6 +43,7 @@ class Table(eqx.Module):
 
 @partial(jax.jit, inline=True)
 def _read(stations: Float[Array, " S"], values: Float[Array, " S"], r: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """One program where nobody compiles around it; within jit its operations stand as if written there."""
     widths = jnp.diff(stations)
     come = jnp.clip(r[..., None] - stations[:-1], 0, widths)
     return values[0] + jnp.sum(come * (jnp.diff(values) / widths), axis=-1)

@@ -13,13 +13,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 
-def inner_slopes(x: Any, y: Any, xp: Any) -> Any:
-    """Slopes at all rows but the first and the last, from nodes x [N] and values y [N, C]; xp: numpy, or jax's.
+def inner_slopes(widths: Any, y: Any, xp: Any) -> Any:
+    """Slopes at all rows but the first and the last, from widths [N−1] between nodes and values y [N, C] at them; xp:
+    numpy, or jax's.
 
     The harmonic mean of the neighbouring intervals' slopes, weighted by their widths (Fritsch & Butland, SIAM J. Sci.
     Stat. Comput. 5, 1984, Eq. 5); zero where those differ in sign.
     """
-    width = xp.diff(x)[:, None]
+    width = widths[:, None]
     slope = (y[1:] - y[:-1]) / width
     before, after = slope[:-1], slope[1:]
     w_before, w_after = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
@@ -43,8 +44,9 @@ def with_slopes(x: Any, y: Any, xp: Any) -> Any:
 
     xp: numpy, or jax's.
     """
-    steps = xp.diff(y) / xp.diff(x)
-    inner = inner_slopes(x, y[:, None], xp)[:, 0]
+    widths = xp.diff(x)
+    steps = xp.diff(y) / widths
+    inner = inner_slopes(widths, y[:, None], xp)[:, 0]
     return xp.stack([y, xp.concatenate([steps[:1], inner, steps[-1:]])], axis=-1)
 
 

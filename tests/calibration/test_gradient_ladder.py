@@ -120,9 +120,13 @@ def inflow_of(v):
     made, tau = contracting(v), v[5:]
     unit = model.unit_states(made)
     state = model.steady_state(made, tau, 0.01, unit)
-    a = model.with_ground(tau * model.answer_means(made), made).a
+    grounded = model.with_ground(tau * model.answer_means(made), made)
     return jnp.concatenate(
-        [jnp.ravel(model.inflow(state, R, PSI[:2], made)), model.unit_inflow(made, unit, R, 0.3 * R).T @ a]
+        [
+            jnp.ravel(model.inflow(state, R, PSI[:2], made)),
+            model.unit_inflow(made, unit, R, 0.3 * R).T @ grounded.a,
+            grounded.c,
+        ]
     )
 
 
