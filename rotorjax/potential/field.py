@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.potential.ellipsoidal import Ellipsoidal, ellipsoidal
-from rotorjax.potential.legendre import Pairs, double_factorial, k_constant, legendre_p, legendre_q
+from rotorjax.potential.legendre import Pairs, combined, double_factorial, k_constant, legendre_p, legendre_q
 from rotorjax.potential.modes import ModeTable
 
 
@@ -33,13 +33,15 @@ def _harmonics(highest: int, at: Ellipsoidal) -> tuple[list[Array], list[Array]]
     return cosines, sines
 
 
-def _by_mode(modes: ModeTable, radial: Float[Array, "L ..."], at: Ellipsoidal) -> Float[Array, "M ..."]:
-    """Multiply functions of (ν, η), one for each pair of `modes`, by (1−ν²)^{m/2} {cos, sin} mψ."""
+def _by_mode(modes: ModeTable, radial: Float[Array, "M ..."], at: Ellipsoidal) -> Float[Array, "M ..."]:
+    """Multiply functions of (ν, η), one for each mode, by (1−ν²)^{m/2} {cos, sin} mψ."""
     highest = int(modes.m.max())
+    if highest == 0:
+        return radial
     cosines, sines = _harmonics(highest, at)
-    both = jnp.stack(cosines + sines)
-    angular = both[np.array([mode.m + (highest + 1) * (mode.kind == "sin") for mode in modes.modes])]
-    return radial[modes.pair_index] * angular
+    waves = [(m, kind) for kind in ("cos", "sin") for m in range(highest + 1)]
+    choice = np.array([[(mode.m, mode.kind) == wave for wave in waves] for mode in modes.modes])
+    return radial * combined(choice, jnp.stack(cosines + sines))
 
 
 def _radial(pairs: Pairs, at: Ellipsoidal) -> Float[Array, "L ..."]:
@@ -105,21 +107,25 @@ def velocity_potentials(
     axis below the disk.
     """
     at = ellipsoidal(points)
-    needed = [(m, n + 1) for m, n in modes.pairs] + [(m, n - 1) for m, n in modes.pairs if n > m]
-    pairs = tuple(dict.fromkeys(needed))
-    radial = _radial(pairs, at)
-    above = np.array([pairs.index((m, n + 1)) for m, n in modes.pairs])
-    below = np.array([pairs.index((m, n - 1)) if n > m else 0 for m, n in modes.pairs])
-    column = (-1,) + (1,) * at.nu.ndim
-    up, down = (
-        jnp.asarray(factors, radial.dtype).reshape(column)
-        for factors in ([sigma(m, n) for m, n in modes.pairs], [zeta(m, n) if n > m else 0.0 for m, n in modes.pairs])
-    )
-    rows = up * radial[above] + down * radial[below]
-    for k, (m, n) in enumerate(modes.pairs):
-        if n == m:
-            rows = rows.at[k].add(_diagonal_remainder(m, at) + (2 / pi * log(outer_radius) if m == 0 else 0.0))
+    parts, shares = _neighbours(modes)
+    rows = combined(shares, _radial(parts, at))
+    diagonal = modes.diagonal.reshape(-1, *(1,) * at.nu.ndim)
+    for m in dict.fromkeys(modes.m[modes.diagonal]):
+        more = _diagonal_remainder(int(m), at) + (2 / pi * log(outer_radius) if m == 0 else 0.0)
+        rows = rows + jnp.where(diagonal & (modes.m == m).reshape(diagonal.shape), more, 0.0)
     return _by_mode(modes, rows, at)
+
+
+def _neighbours(modes: ModeTable) -> tuple[Pairs, np.ndarray]:
+    """The pairs of one degree more and less (P of them), and what share each mode's Ψ has of them, (M, P) (Eq. 26)."""
+    above, below = ([(mode.m, mode.n + step) for mode in modes.modes] for step in (1, -1))
+    pairs = tuple(dict.fromkeys(above + [(m, n) for m, n in below if n >= m]))
+    shares = np.zeros((len(modes), len(pairs)))
+    for row, (m, n, _) in zip(shares, modes.modes, strict=True):
+        row[pairs.index((m, n + 1))] = sigma(m, n)
+        if n > m:
+            row[pairs.index((m, n - 1))] = zeta(m, n)
+    return pairs, shares
 
 
 @jax.jit

@@ -1,7 +1,7 @@
 """Normalised associated Legendre functions P̄_n^m(ν) and Q̄_n^m(iη) of Appendix B for a whole list of (m, n) at once.
 
 P̄ comes as (1−ν²)^{m/2} times a polynomial, which is returned without that factor: with r^m cos mψ beside it the
-product stays smooth on the axis.
+product stays smooth on the axis. It is one matrix product for all modes, too.
 
 Q̄ decays with n where P̄(iη) grows, so the upward recursion drowns in rounding (4e-2 at η = 5, n = 7), and the
 series in 1/(1+η²) does not converge near the disk. Three steps avoid both; each adds positive numbers only (but for
@@ -12,12 +12,13 @@ signs inside one short series), so that no digit is lost, and there is no branch
 2. downward in n:  Q̄_{n−1}^m = Q̄_{n+1}^m + (2n+1) K_n^m η Q̄_n^m;
 3. upward in m:    Q̄_n^{m+1} = Q̄_n^{m−1} + 2m K_n^m η/√(1+η²) Q̄_n^m.
 The steps run once, in numpy, at Chebyshev nodes in u; what is left, Q̄_n^m e^{−n−1} as a function of u, is smooth
-on [0, ½] and comes from a product of its Chebyshev coefficients with T_k(4u − 1): one matrix product for all modes,
+on [0, ½] and comes from a product of its coefficients with powers of 4u − 1: one matrix product for all modes,
 compiled in an instant. The factor e^{n+1} outside it keeps the far field's relative accuracy, in float32 too.
 """
 
+from fractions import Fraction
 from functools import cache, partial
-from math import factorial, pi, prod, sqrt
+from math import comb, factorial, perm, pi, prod, sqrt
 
 import jax
 import jax.numpy as jnp
@@ -45,17 +46,22 @@ def k_constant(m: int, n: int) -> float:
     return (2 / pi if (n + m) % 2 else pi / 2) * h_constant(m, n)
 
 
-def _first_polynomial(m: int) -> float:
-    """P̄_m^m without (1−ν²)^{m/2} (Eqs. 22a, 23a)."""
-    return sqrt((2 * m + 1) * double_factorial(2 * m - 1) / double_factorial(2 * m))
+@cache
+def _bernstein_table(pairs: Pairs) -> np.ndarray:
+    """Coefficients of tⁱ(1−t)^{D−i} in the polynomials of `reduced_legendre_p`, (L, D + 1), by way of exact fractions.
 
-
-def _upward_steps(orders: list[int], steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients a, b (steps, orders) of P̄_{n+1} = a ν P̄_n − b P̄_{n−1} from n = m up, one column for each order m."""
-    m, n = np.array(orders)[None, :], np.array(orders)[None, :] + np.arange(steps)[:, None]
-    new = (n + 1) ** 2 - m**2
-    b = (2 * n + 3) * (n**2 - m**2) / (np.maximum(2 * n - 1, 1) * new)  # 2n − 1 < 0 only at n = m = 0, where b = 0
-    return np.sqrt((2 * n + 3) * (2 * n + 1) / new), np.sqrt(b)
+    In these terms a polynomial keeps its own size at either end, where one of them is left: no digit is lost.
+    """
+    degree = max((n - m) // 2 for m, n in pairs)
+    rows = []
+    for m, n in pairs:
+        count = (n - m) // 2
+        power = [(-1) ** k * comb(n, k) * comb(2 * n - 2 * k, n) * perm(n - 2 * k, m) for k in range(count + 1)][::-1]
+        raised = [
+            sum(Fraction(comb(i, j), comb(degree, j)) * c for j, c in enumerate(power)) for i in range(degree + 1)
+        ]
+        rows.append([float(c * comb(degree, i) / 2**n) / rho(m, n) for i, c in enumerate(raised)])
+    return np.array(rows)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -64,28 +70,32 @@ def reduced_legendre_p(pairs: Pairs, nu_squared: Float[Array, "*N"]) -> Float[Ar
 
     pairs: L tuples (m, n), static. On the disk ν² = 1−r̄², so there is no root at the edge.
     """
-    orders, steps = sorted({m for m, _ in pairs}), max(n - m for m, n in pairs)
-    shape = (len(orders),) + (1,) * jnp.ndim(nu_squared)
-    first = jnp.asarray([_first_polynomial(m) for m in orders], jnp.result_type(nu_squared)).reshape(shape)
-    first = first * jnp.ones_like(nu_squared)
-    a, b = (jnp.asarray(c, first.dtype).reshape(steps, *shape) for c in _upward_steps(orders, steps))
-    to_odd = np.arange(steps) % 2 == 0
-
-    def step(carry: tuple[Array, Array], row: tuple[Array, Array, Array]) -> tuple[tuple[Array, Array], Array]:
-        (previous, current), (a, b, to_odd) = carry, row
-        new = a * jnp.where(to_odd, 1.0, nu_squared) * current - b * previous
-        return (current, new), new
-
-    rows = jax.lax.scan(step, (jnp.zeros_like(first), first), (a, b, to_odd))[1]  # (steps, orders, *N)
-    rows = jnp.concatenate([first[None], rows])
-    return rows[np.array([n - m for m, n in pairs]), np.array([orders.index(m) for m, _ in pairs])]
+    table, t = _bernstein_table(pairs), jnp.asarray(nu_squared)
+    rising = list(range(table.shape[1]))
+    return combined(table, powers(t, rising) * powers(1 - t, rising[::-1]))
 
 
+def _column(values: np.ndarray, like: Float[Array, "*N"]) -> np.ndarray:
+    """One number for each pair, against an array for each."""
+    return values.reshape(-1, *(1,) * like.ndim)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
 @partial(jax.jit, static_argnums=0)
 def legendre_p(pairs: Pairs, nu: Float[Array, "*N"]) -> Float[Array, "L ..."]:
     """Return P̄_n^m(ν)/(1−ν²)^{m/2} for L pairs (m, n): polynomials in ν (Eqs. 22a, 23a)."""
-    odd = np.array([(n - m) % 2 == 1 for m, n in pairs]).reshape((-1,) + (1,) * jnp.ndim(nu))
-    return reduced_legendre_p(pairs, nu * nu) * jnp.where(odd, nu, jnp.ones_like(nu))
+    nu = jnp.asarray(nu)
+    odd = np.array([(n - m) % 2 == 1 for m, n in pairs])
+    return reduced_legendre_p(pairs, nu * nu) * jnp.where(_column(odd, nu), nu, 1.0)
+
+
+@legendre_p.defjvp
+def _legendre_p_jvp(pairs: Pairs, primals: tuple[Array], tangents: tuple[Array]) -> tuple[Array, Array]:
+    """A derivative of P_n of order m has one of order m + 1 as its derivative; that of order n is level."""
+    nu = jnp.asarray(primals[0])
+    factor = np.array([sqrt((n + m + 1) * (n - m)) for m, n in pairs])
+    both = legendre_p(pairs + tuple((min(m + 1, n), n) for m, n in pairs), nu)
+    return both[: len(pairs)], _column(factor.astype(nu.dtype), nu) * both[len(pairs) :] * tangents[0]
 
 
 def _series(m: int, n: int, u: np.ndarray) -> np.ndarray:
@@ -119,31 +129,35 @@ def _flattening(m: int, n: int) -> int:
 
 
 @cache
-def _chebyshev_table(pairs: Pairs) -> np.ndarray:
-    """Chebyshev coefficients in 4u − 1 of each flattened row, (L, 25): analytic up to u = 1, they end at 5.8^{−24}."""
+def _power_table(pairs: Pairs) -> np.ndarray:
+    """Coefficients of the powers of 4u − 1 in each flattened row, (L, 25), by way of Chebyshev's.
+
+    Those end at 5.8^{−24}, since a row is analytic up to u = 1; a power's share in T_k grows as 2.4^k alone.
+    """
     node = np.polynomial.chebyshev.chebpts1(_TERMS)
     u = (node + 1) / 4
     rows = _scaled_q(max(n for _, n in pairs), tuple(u))
     values = np.stack([rows[m, n] / (1 - u) ** _flattening(m, n) for m, n in pairs])
     basis = np.polynomial.chebyshev.chebvander(node, _TERMS - 1)  # orthogonal on its nodes
-    return values @ basis * np.where(np.arange(_TERMS) == 0, 1, 2) / _TERMS
+    series = values @ basis * np.where(np.arange(_TERMS) == 0, 1, 2) / _TERMS
+    return np.stack([np.polynomial.chebyshev.cheb2poly(row) for row in series])
 
 
-def _chebyshev_basis(x: Float[Array, "*N"]) -> Float[Array, "T ..."]:
-    """T_0 … T_24 at x, by doubling (T_{k+j} = 2 T_k T_j − T_{k−j}): few operations, so that they compile fast."""
-    rows = jnp.stack([jnp.ones_like(x), x])
-    while (k := len(rows) - 1) < _TERMS - 1:
-        j = min(k, _TERMS - 1 - k)
-        rows = jnp.concatenate([rows, 2 * rows[k] * rows[1 : j + 1] - rows[k - j : k][::-1]])
-    return rows
+def combined(table: np.ndarray, basis: Float[Array, "T ..."]) -> Float[Array, "L ..."]:
+    """Return the matrix product of numbers (L, T) and functions.
+
+    XLA fuses nothing past it: else each use of a value would go through all of its steps again.
+    """
+    return jnp.tensordot(jnp.asarray(table, basis.dtype), basis, 1, precision=jax.lax.Precision.HIGHEST)
 
 
 def powers(x: Float[Array, "*N"], exponents: list[int]) -> Float[Array, "L ..."]:
-    """Return x to each exponent, by doubling (no 0/0 in any derivative at x = 0)."""
-    rows = jnp.stack([jnp.ones_like(x), x])
-    while len(rows) <= max(exponents):
-        rows = jnp.concatenate([rows, rows[1:] * rows[-1]])
-    return rows[np.array(exponents)]
+    """Return x to each exponent, by its binary digits (no 0/0 in any derivative at x = 0)."""
+    left = np.array(exponents).reshape(-1, *(1,) * jnp.ndim(x))
+    product = jnp.ones(left.shape, jnp.result_type(x))
+    while left.any():
+        product, x, left = product * jnp.where(left % 2 == 1, x, 1.0), x * x, left // 2
+    return product * jnp.ones_like(x)
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
@@ -153,8 +167,7 @@ def legendre_q(pairs: Pairs, eta: Float[Array, "*N"]) -> Float[Array, "L ..."]:
     eta = jnp.asarray(eta)
     e = 1 / (eta + jnp.sqrt(1 + eta * eta))  # √(1+η²) − η without cancellation
     u = e * e / (1 + e * e)
-    table = jnp.asarray(_chebyshev_table(pairs), eta.dtype)
-    rows = jnp.tensordot(table, _chebyshev_basis(4 * u - 1), 1, precision=jax.lax.Precision.HIGHEST)
+    rows = combined(_power_table(pairs), powers(4 * u - 1, list(range(_TERMS))))
     rows = rows * jnp.sqrt(2 * (1 - u)) * powers(e, [n + 1 for _, n in pairs])
     flattening = [_flattening(m, n) for m, n in pairs]
     return rows * powers(1 - u, flattening) if any(flattening) else rows

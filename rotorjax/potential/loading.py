@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.errors import InputError
-from rotorjax.potential.legendre import reduced_legendre_p
+from rotorjax.potential.legendre import powers, reduced_legendre_p
 from rotorjax.potential.modes import ModeTable
 
 
@@ -32,8 +32,7 @@ def shaping(modes: ModeTable, r: Float[Array, "*N"]) -> Float[Array, "M ..."]:
     """
     if modes.parity == "even":
         raise InputError("Argument `modes` must have n + m odd to carry a load, but has n + m even")
-    power = jnp.stack([r**m if m else jnp.ones_like(r) for m, _ in modes.pairs])
-    rows = (power * reduced_legendre_p(modes.pairs, 1 - r * r))[modes.pair_index]
+    rows = powers(r, list(modes.m)) * reduced_legendre_p(modes.pairs, 1 - r * r)
     return jnp.where(modes.odd.reshape((-1,) + (1,) * r.ndim), rows, 0.0)
 
 

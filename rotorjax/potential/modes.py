@@ -58,14 +58,8 @@ class ModeTable(eqx.Module):
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """The different (m, n), in order."""
-        return tuple(dict.fromkeys((mode.m, mode.n) for mode in self.modes))
-
-    @property
-    def pair_index(self) -> np.ndarray:
-        """Position of each mode's (m, n) in `pairs`, (M,)."""
-        index = {pair: i for i, pair in enumerate(self.pairs)}
-        return np.array([index[mode.m, mode.n] for mode in self.modes])
+        """(m, n) of each mode, (M,)."""
+        return tuple((mode.m, mode.n) for mode in self.modes)
 
     @property
     def m(self) -> np.ndarray:

@@ -214,7 +214,9 @@ RUNGS = [
         {"ordinary": ([0.4], True), "on the disk": ([0.0], True), "far": ([40.0], True)},
     ),
     Rung(
-        ("legendre.powers",), lambda v: legendre.powers(v, [1, 3]), {"ordinary": ([0.4], True), "zero": ([0.0], True)}
+        ("legendre.powers", "legendre.combined"),
+        lambda v: legendre.combined(np.array([[1.0, 0.0], [2.0, -3.0]]), legendre.powers(v, [1, 3])),
+        {"ordinary": ([0.4], True), "zero": ([0.0], True)},
     ),
     Rung(("field.pressure_functions",), lambda v: flow.pressure_functions(ROTOR, v), ABOVE),
     Rung(("field.disk_functions",), lambda v: flow.disk_functions(ROTOR, v[0], v[1]), STATIONS),
