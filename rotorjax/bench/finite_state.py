@@ -1,10 +1,11 @@
 """The VPBFSM of one case: driven by given blade loads, or by those of its own inflow; as printed, and exact image too.
 
-All that a case needs is evaluated at once, in one compiled function that every case over ground shares: each separate
-evaluation of the Legendre functions costs seconds of compilation and microseconds of work.
+What unit states make is evaluated once, at all places of a case, in a compiled function that every case over ground and
+the balance of loads and inflow share: each separate evaluation of the Legendre functions costs half a second of
+compilation and microseconds of work.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,7 +15,7 @@ from jaxtyping import Array, Float
 from rotorjax.bench.cases import Case
 from rotorjax.bench.settings import StudySettings
 from rotorjax.errors import InputError
-from rotorjax.inflow.balance import Balance, Stations, axial_state, balance, pressure, stations_of
+from rotorjax.inflow.balance import Balance, StationFlow, Stations, axial_state, balance, pressure, stations_of
 from rotorjax.limits import check_axial, check_flight
 from rotorjax.potential import loading, rigid_cylinder
 from rotorjax.potential.ground_source import DiskQuadrature
@@ -25,6 +26,10 @@ from rotorjax.potential.model import (
     finite_state_model,
     ground_normal_velocity_rms,
     mean_inflow,
+    relative_residual,
+    rotor_into_ground,
+    unit_inflow,
+    unit_states,
 )
 
 GRID_R = np.linspace(0.0, 1 - 1e-6, 64)  # 64 × 72 points for pictures: on the rim rounding says what is the disk
@@ -105,48 +110,87 @@ def of_pressure(case: Case, settings: StudySettings, tau: np.ndarray, stations: 
     return evaluate(models_of(case, settings), jnp.asarray(tau), stations, jnp.asarray(settings.climb_ratio))
 
 
+class UnitFlow(eqx.Module):
+    """What a model's unit rotor states make. at: the stations. on_grid (M, 72, 64): inflow on GRID_PSI × GRID_R.
+    into_ground (M, N): flow into the plane at the ground disk's points, None without ground.
+    """
+
+    at: StationFlow
+    on_grid: Float[Array, "M 72 64"]
+    into_ground: Float[Array, "M N"] | None
+
+
 @eqx.filter_jit
+def unit_flow(model: FiniteStateModel, stations: Stations) -> UnitFlow:
+    """The costly part of a case, which neither blades nor loads change."""
+    unit = unit_states(model)
+    there, on_grid = _at_once(lambda x, y: unit_inflow(model, unit, x, y), stations.xy, _on_grid(GRID_PSI, stations))
+    into = None if model.ground is None else rotor_into_ground(model, model.ground)
+    return UnitFlow(StationFlow(unit, there), on_grid, into)
+
+
 def evaluate(
     models: tuple[FiniteStateModel, FiniteStateModel],
     tau: Float[Array, " M"],
     stations: Stations,
     climb: Float[Array, ""],
+    flow: UnitFlow | None = None,
 ) -> FiniteStateResult:
-    """Steady states of a loading and all fields of `FiniteStateResult`; models: as `models_of` returns them."""
-    model, printed = models
-    state, printed_state = axial_state(model, tau, climb), axial_state(printed, tau, climb)
-    x, y, nu, weights = (jnp.asarray(v, tau.dtype) for v in model.quadrature.rule())
-    area = 2 * nu * weights  # r dr = −ν dν
-    grid_r, grid_psi, sides = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI, DIAMETER_PSI))
-    at_stations, on_grid, across = _polar(stations.r, stations.psi), _polar(grid_r, grid_psi), _polar(grid_r, sides)
+    """Steady states of a loading and all fields of `FiniteStateResult`.
 
-    ours = _at_once(lambda x, y: disk_inflow(state, x, y, model), at_stations, on_grid)
-    paper = _at_once(lambda x, y: disk_inflow(printed_state, x, y, printed), at_stations, across)
-    printed_mean = mean_inflow(printed_state, printed)
+    models: as `models_of` returns them. flow: of the first one, where it is at hand.
+    """
+    model, printed = models
+    flow = unit_flow(model, stations) if flow is None else flow
+    ours, theirs = _default(model, flow, tau, stations, climb), _printed(printed, tau, stations, climb)
+    return FiniteStateResult(tau=tau, **ours, **theirs)
+
+
+@eqx.filter_jit
+def _default(model: FiniteStateModel, flow: UnitFlow, tau, stations: Stations, climb) -> dict[str, Any]:
+    """The default model's part of the result."""
+    unit = flow.at.unit
+    state = axial_state(model, tau, climb, unit)
+    left = jnp.asarray(jnp.nan, tau.dtype)
+    if model.ground is not None:
+        left = relative_residual(state.c, state.a @ flow.into_ground, model, model.ground)
+    grid_r, grid_psi = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI))
+    return {
+        "states": state,
+        "inflow": jnp.tensordot(state.a, flow.at.at, 1),
+        "inflow_grid": jnp.tensordot(state.a, flow.on_grid, 1),
+        "mean_inflow": (unit.down - unit.up) @ state.a,
+        "dct_dr": loading.distribution(tau, stations.r, stations.psi, model.modes),
+        "dct_dr_grid": loading.distribution(tau, grid_r, grid_psi, model.modes),
+        "ground_normal_velocity_rms": left,
+    }
+
+
+@eqx.filter_jit
+def _printed(model: FiniteStateModel, tau, stations: Stations, climb) -> dict[str, Any]:
+    """The paper's own model and the exact image of its cylinder."""
+    state = axial_state(model, tau, climb)
+    across = _on_grid(DIAMETER_PSI, stations)
+    paper = _at_once(lambda x, y: disk_inflow(state, x, y, model), stations.xy, across)
+    mean = mean_inflow(state, model)
     if model.ground is None:
-        exact, left = [*paper, None], [jnp.asarray(jnp.nan, tau.dtype)] * 2
+        exact, exact_mean, left = paper, mean, jnp.asarray(jnp.nan, tau.dtype)
     else:
-        exact = _at_once(
-            lambda x, y: rigid_cylinder.disk_inflow(printed_state, x, y, printed, PATCH), at_stations, across, (x, y)
+        x, y, nu, weights = (jnp.asarray(v, tau.dtype) for v in model.quadrature.rule())
+        *exact, over_disk = _at_once(
+            lambda x, y: rigid_cylinder.disk_inflow(state, x, y, model, PATCH), stations.xy, across, (x, y)
         )
-        left = [ground_normal_velocity_rms(*pair) for pair in ((state, model), (printed_state, printed))]
-    return FiniteStateResult(
-        tau=tau,
-        states=state,
-        inflow=ours[0],
-        printed_inflow=paper[0],
-        exact_image_inflow=exact[0],
-        dct_dr=loading.distribution(tau, stations.r, stations.psi, model.modes),
-        inflow_grid=ours[1],
-        dct_dr_grid=loading.distribution(tau, grid_r, grid_psi, model.modes),
-        printed_diameter=paper[1],
-        exact_image_diameter=exact[1],
-        mean_inflow=mean_inflow(state, model),
-        printed_mean_inflow=printed_mean,
-        exact_image_mean_inflow=printed_mean if exact[2] is None else area @ exact[2],
-        ground_normal_velocity_rms=left[0],
-        printed_ground_normal_velocity_rms=left[1],
-    )
+        exact_mean = (2 * nu * weights) @ over_disk  # r dr = −ν dν
+        left = ground_normal_velocity_rms(state, model)
+    return {
+        "printed_inflow": paper[0],
+        "printed_diameter": paper[1],
+        "printed_mean_inflow": mean,
+        "printed_ground_normal_velocity_rms": left,
+        "exact_image_inflow": exact[0],
+        "exact_image_diameter": exact[1],
+        "exact_image_mean_inflow": exact_mean,
+    }
 
 
 def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Balance]:
@@ -156,17 +200,22 @@ def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Balan
     """
     models = models_of(case, settings)
     guess = check_axial("vpbfsm", settings.rotor, settings.operating)
-    found = balance(models[0], settings.rotor, settings.operating, stations_of(settings.rotor), guess)
+    stations = stations_of(settings.rotor)
+    flow = unit_flow(models[0], stations)
+    found = balance(models[0], settings.rotor, settings.operating, stations, guess, flow.at)
     check_flight("vpbfsm", float(found.CT), settings.climb_ratio)
-    return evaluate(models, found.tau, found.stations, jnp.asarray(settings.climb_ratio)), found
+    return evaluate(models, found.tau, stations, jnp.asarray(settings.climb_ratio), flow), found
 
 
-def _polar(r: Array, psi: Array) -> tuple[Array, Array]:
+def _on_grid(psi: np.ndarray, stations: Stations) -> tuple[Array, Array]:
+    """Places at GRID_R on each of these azimuths, in the stations' precision."""
+    r, psi = (jnp.asarray(v, stations.r.dtype) for v in (GRID_R, psi))
     return r * jnp.cos(psi)[:, None], r * jnp.sin(psi)[:, None]
 
 
 def _at_once(function, *places: tuple[Array, Array]) -> list[Array]:
-    """Evaluate function(x, y) at all places in one call and give each its own values back."""
+    """Evaluate function(x, y) at all places in one call and give each its own values back, behind other axes."""
     x, y = (jnp.concatenate([place[i].ravel() for place in places]) for i in (0, 1))
     ends = np.cumsum([place[0].size for place in places])[:-1]
-    return [v.reshape(place[0].shape) for v, place in zip(jnp.split(function(x, y), ends), places, strict=True)]
+    parts = jnp.split(function(x, y), ends, axis=-1)
+    return [v.reshape(*v.shape[:-1], *place[0].shape) for v, place in zip(parts, places, strict=True)]

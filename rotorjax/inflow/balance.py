@@ -42,6 +42,13 @@ class Stations(eqx.Module):
         return self.r * jnp.cos(self.psi)[:, None], self.r * jnp.sin(self.psi)[:, None]
 
 
+class StationFlow(eqx.Module):
+    """unit: of a model. at (M, K, R): inflow of unit rotor states at the stations."""
+
+    unit: UnitStates
+    at: Float[Array, "M K R"]
+
+
 class Balance(eqx.Module):
     """Loads and inflow in balance, in rotor units. tau (M,): pressure coefficients. state: rotor and ground.
 
@@ -100,14 +107,20 @@ def axial_state(
 
 
 def balance(
-    model: FiniteStateModel, rotor: Rotor, operating: OperatingPoint, stations: Stations, thrust: float = FIRST_CT
+    model: FiniteStateModel,
+    rotor: Rotor,
+    operating: OperatingPoint,
+    stations: Stations,
+    thrust: float = FIRST_CT,
+    flow: StationFlow | None = None,
 ) -> Balance:
     """Find the loading that reproduces itself, by Newton's method; differentiable by the implicit function theorem.
 
-    thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. No tip
-    loss beyond what the expansion has. Raises InputError where none is found, under jit an error at run time.
+    thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. flow: of
+    unit states at the stations, where it is at hand. No tip loss beyond what the expansion has. Raises InputError where
+    none is found, under jit an error at run time.
     """
-    flow = flow_of(model, stations)
+    flow = flow_of(model, stations) if flow is None else flow
     tau, found = _search(flow, model, rotor, operating, stations, jnp.asarray(thrust, stations.r.dtype))
     pitch = f"at {np.rad2deg(float(operating.collective)):g} deg " if known(operating.collective) else ""
     words = (
@@ -117,13 +130,6 @@ def balance(
     if known(found) and not bool(found):
         raise InputError(words)
     return _read(eqx.error_if(tau, ~found, words), flow, model, rotor, operating, stations)
-
-
-class StationFlow(eqx.Module):
-    """unit: of a model. at (M, K, R): inflow of unit rotor states at the stations."""
-
-    unit: UnitStates
-    at: Float[Array, "M K R"]
 
 
 @eqx.filter_jit
