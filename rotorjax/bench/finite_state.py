@@ -152,7 +152,7 @@ def _default(model: FiniteStateModel, flow: UnitFlow, tau, stations: Stations, c
     unit = flow.at.unit
     state = axial_state(model, tau, climb, unit)
     left = jnp.asarray(jnp.nan, tau.dtype)
-    if model.ground is not None:
+    if model.ground is not None and flow.into_ground is not None:
         left = relative_residual(state.c, state.a @ flow.into_ground, model, model.ground)
     grid_r, grid_psi = (jnp.asarray(v, tau.dtype) for v in (GRID_R, GRID_PSI))
     return {
@@ -209,8 +209,8 @@ def alone(case: Case, settings: StudySettings) -> tuple[FiniteStateResult, Balan
 
 def _on_grid(psi: np.ndarray, stations: Stations) -> tuple[Array, Array]:
     """Places at GRID_R on each of these azimuths, in the stations' precision."""
-    r, psi = (jnp.asarray(v, stations.r.dtype) for v in (GRID_R, psi))
-    return r * jnp.cos(psi)[:, None], r * jnp.sin(psi)[:, None]
+    r, azimuth = (jnp.asarray(v, stations.r.dtype) for v in (GRID_R, psi))
+    return r * jnp.cos(azimuth)[:, None], r * jnp.sin(azimuth)[:, None]
 
 
 def _at_once(function, *places: tuple[Array, Array]) -> list[Array]:
