@@ -43,6 +43,8 @@ from rotorjax.device import host_threads
 CACHE = str(Path(__file__).parents[1] / ".pytest_cache" / "jax")
 MOST_MAPPINGS = 32_000  # about 5 GB of programs and what they hold
 SHORTEST = 0.1  # seconds of compilation that are worth a file
+MET_ONCE = {"potential", "calibration", "panels", "study", "deck", "inflow", "sweep"}
+"""Folders whose programs hardly another test asks for: writing them took three hundredths of these folders' time."""
 
 gc.set_threshold(200_000, 20, 50)  # tracing makes objects by the million and few that hold each other
 
@@ -83,6 +85,13 @@ def what_runs_long_runs_fast():
     for name, _, _ in compiling.RUN_LONG:
         importlib.import_module(name)
     compiling.to_be_run()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def keep_programs_that_are_met_again(request):
+    """Write to the cache on disk what another file or process will read: of all programs seven in a hundred are."""
+    worth = 1e9 if request.path.parent.name in MET_ONCE else SHORTEST
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", worth)
 
 
 @pytest.fixture(autouse=True, scope="module")
