@@ -1,9 +1,11 @@
 """Blade loads and the steady finite-state inflow that make each other: the pressure terms that reproduce themselves."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
@@ -78,6 +80,7 @@ class Balance(eqx.Module):
         return Stations(self.r, self.widths, self.psi)
 
 
+@partial(jax.jit, static_argnames=("panels", "azimuths"), inline=True)
 def stations_of(rotor: Rotor, panels: int = PANELS, azimuths: int = AZIMUTHS) -> Stations:
     """Middles of equal panels from the cut-out to the tip, at equally spaced azimuths."""
     edges = rotor.root_cutout + (1 - rotor.root_cutout) * np.linspace(0.0, 1.0, panels + 1)

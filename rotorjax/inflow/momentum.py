@@ -11,6 +11,7 @@ Ground: Cheeseman and Bennett's T/T∞ = 1/(1 − (1/16h²)/(1 + (μ/λ)²)) at 
 over level ground and for h above about half a radius. Here the thrust is given, and its inflow sought: `ground_share`.
 """
 
+from functools import partial
 from typing import Any, Literal
 
 import jax
@@ -35,6 +36,7 @@ def edgewise(inputs: RotorInputs) -> Float[Array, "2"]:
     return -inputs.velocity[:2]
 
 
+@partial(jax.jit, inline=True)
 def flow_through(
     mean: Float[Array, ""], inputs: RotorInputs
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, "2"]]:
@@ -87,6 +89,7 @@ def flight_state(thrust: float, climb: float, advance: float = 0.0) -> FlightSta
     return "windmill brake" if climb <= VORTEX_RING[0] * np.sqrt(abs(thrust) / 2) else "slow descent"
 
 
+@partial(jax.jit, inline=True)
 def hover_inflow(thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, ""]:
     """Momentum theory's induced inflow λ_i of a thrust: C_T = 2λ_i√(μ² + (λ_i + λ_c)²), down for a thrust up."""
     wind = edgewise(inputs)

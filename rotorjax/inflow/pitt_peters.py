@@ -14,6 +14,9 @@ impermeable disk, 8/3π, as in Carpenter & Fridovich; Pitt and Peters' own choic
 128/75π. The gain from moments to gradients is (1 ∓ X²): 4 sin α/(1 + sin α) and 4/(1 + sin α) in their angle.
 """
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -33,10 +36,7 @@ class PittPeters(InflowModel):
 
     def start(self, thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, "3"]:
         """Steady inflow of a thrust without moments."""
-        mean = hover_inflow(thrust, inputs)
-        total, _, skew = flow_through(mean, inputs)
-        # in air at rest the skew is zero, and so is the wind that it would need
-        return jnp.concatenate([mean[None], COUPLING * thrust / jnp.where(total == 0, 1.0, total) * skew])
+        return _without_moments(thrust, inputs)
 
     def velocity(
         self, state: Float[Array, "3"], points: Float[Array, "*n 3"], inputs: RotorInputs
@@ -51,6 +51,14 @@ class PittPeters(InflowModel):
         carried = jnp.linalg.solve(static_gain(skew), state)
         flow = jnp.stack([total, varying, varying])
         return (disk_moments(loads) - flow * carried) / self.mass
+
+
+@partial(jax.jit, inline=True)
+def _without_moments(thrust: Float[Array, ""], inputs: RotorInputs) -> Float[Array, "3"]:
+    mean = hover_inflow(thrust, inputs)
+    total, _, skew = flow_through(mean, inputs)
+    # in air at rest the skew is zero, and so is the wind that it would need
+    return jnp.concatenate([mean[None], COUPLING * thrust / jnp.where(total == 0, 1.0, total) * skew])
 
 
 def pitt_peters(first_mass: float = APPARENT_MASS) -> PittPeters:

@@ -5,8 +5,10 @@ are n outboard, t = −∂n/∂ζ / cos β in the sense of rotation and k = ∂n
 out, as blade-element theory does.
 """
 
+from functools import partial
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -42,6 +44,7 @@ class AirLoads(NamedTuple):
     loads: SectionLoads
 
 
+@partial(jax.jit, static_argnames="panels", inline=True)
 def blade_sections(rotor: Rotor, panels: int = 24) -> Sections:
     """Cut the aerofoil part of a blade into equal panels."""
     share = jnp.asarray(np.linspace(0.0, 1.0, panels + 1))

@@ -40,13 +40,13 @@ def means(found: Trimmed | TrimmedInWake) -> Means:
 
 
 def _in_model(found: Trimmed) -> Means:
-    out, z = outputs_at(found.z, found.flight, found.p), found.z.controls
+    out, z = jax.tree.map(np.asarray, outputs_at(found.z, found.flight, found.p)), found.z.controls
     powers = ("CT", "CQ", "CP_induced", "CP_profile", "CP_parasite", "CP_damper")
     return Means(
-        **{name: float(jnp.mean(getattr(out, name))) for name in powers},
-        flap=np.array([float(jnp.mean(out.flap)), *map(float, cyclic(out.flap))]),
-        lag=np.array([float(jnp.mean(out.lag)), *map(float, cyclic(out.lag))]),
-        moment=np.asarray(jnp.mean(out.moment, axis=0)),
+        **{name: float(np.mean(getattr(out, name))) for name in powers},
+        flap=np.array([float(np.mean(out.flap)), *map(float, cyclic(out.flap))]),
+        lag=np.array([float(np.mean(out.lag)), *map(float, cyclic(out.lag))]),
+        moment=np.mean(out.moment, axis=0),
         controls=np.array([float(v) for v in (z.theta_0, z.theta_1c, z.theta_1s, z.tilt)]),
     )
 

@@ -6,6 +6,7 @@ flapping or no hub moment, and a given tilt or the balance of the drag of a fuse
 of a revolution in multi-blade coordinates, the differential one with its sign changed.
 """
 
+from functools import partial
 from typing import Literal
 
 import equinox as eqx
@@ -55,6 +56,7 @@ class Trim(eqx.Module):
     controls: Controls
 
 
+@partial(jax.jit, inline=True)
 def inputs_at(controls: Controls, flight: SteadyFlight) -> RotorInputs:
     """The rotor's inputs in steady flight: velocities of the hub along the tilted shaft's axes."""
     zero = jnp.zeros_like(controls.tilt)
@@ -145,6 +147,7 @@ def outputs_at(z: Trim, flight: SteadyFlight, p: CoupledRotor) -> Outputs:
     return rates_and_outputs(z, flight, p)[1]
 
 
+@partial(jax.jit, inline=True)
 def cyclic(flap: Float[Array, "K B"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
     """First harmonics β_1c and β_1s (rad) of a blade's flap, or of its lag, over a revolution."""
     nodes, blades = flap.shape

@@ -70,9 +70,10 @@ def flight(
 def most_thrust(p: CoupledRotor, advance: float) -> float:
     """C_T that no inflow can exceed: every section at the greatest lift of its table, all round the disk."""
     sections = sections_of(p)
-    most = float(jnp.max(p.rotor.airfoil.cl))
-    dynamic = 0.5 * chord(p.rotor, sections.r) * (sections.r**2 + advance**2 / 2)
-    return float(p.rotor.blades / jnp.pi * most * jnp.sum(dynamic * sections.widths * sections.lifting))
+    most = np.max(p.rotor.airfoil.cl)
+    r, widths, lifting = (np.asarray(v) for v in (sections.r, sections.widths, sections.lifting))
+    dynamic = 0.5 * np.asarray(chord(p.rotor, sections.r)) * (r**2 + advance**2 / 2)
+    return float(p.rotor.blades / np.pi * most * np.sum(dynamic * widths * lifting))
 
 
 def guess(p: CoupledRotor, flight: SteadyFlight, azimuths: int = AZIMUTHS) -> Trim:
@@ -94,10 +95,11 @@ def guess(p: CoupledRotor, flight: SteadyFlight, azimuths: int = AZIMUTHS) -> Tr
         flight.tilt,
     )
     nodes = -(-azimuths // blades)
-    still = jnp.zeros((nodes, blades))
-    rotor = RotorState(still.at[:, 0].set(coning), still, still, still)
+    still, level = np.zeros((2, nodes, blades))
+    level[:, 0] = coning
+    rotor = RotorState(*(jnp.asarray(v) for v in (level, still, still, still)))
     state = p.inflow.start(flight.thrust, inputs_at(controls, flight))
-    return Trim(rotor, jax.tree.map(lambda v: jnp.broadcast_to(v, (nodes, *v.shape)), state), controls)
+    return Trim(rotor, jax.tree.map(lambda v: jnp.asarray(np.broadcast_to(v, (nodes, *v.shape))), state), controls)
 
 
 def largest(f: np.ndarray, x: np.ndarray) -> float:
