@@ -19,6 +19,13 @@ def cpu() -> AbstractContextManager:
     return nullcontext() if on_cpu() else jax.default_device(jax.devices("cpu")[0])
 
 
+def as_outside() -> AbstractContextManager[None]:
+    """In a call to the host, programs as they are outside of it: jax names the CPU there, which is a setting that every
+    program would be traced anew for. Beside an accelerator it has to stay: that waits for the host.
+    """
+    return jax.default_device(None) if jax.default_backend() == "cpu" else nullcontext()
+
+
 def full_products() -> AbstractContextManager:
     """In which to trace what must keep its digits: an accelerator would round the factors of matrix products in single
     precision to ten bits, and so the slopes of a Runge-Kutta step. A CPU does not; asked for the same, it is slower.

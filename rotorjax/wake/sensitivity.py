@@ -8,10 +8,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import eval_context
 from jaxtyping import Array, Float
 
 from rotorjax.checks import known
-from rotorjax.device import host_threads, on_cpu
+from rotorjax.device import as_outside, host_threads, on_cpu
 from rotorjax.errors import InputError
 from rotorjax.ode.implicit import attach
 from rotorjax.wake import solution as on_host
@@ -50,12 +51,13 @@ def solve(
                 "of jax.jit"
             )
         numbers, rest = eqx.partition(fixed, eqx.is_array)
-        x = jax.pure_callback(
-            lambda numbers: _found(eqx.combine(numbers, rest), start, None, tol, slices),
-            _shapes(model, slices),
-            numbers,
-            vmap_method="sequential",
-        )
+
+        def search(numbers: FreeWake) -> Unknowns:
+            plain = jax.tree.map(np.asarray, numbers)  # bound to no device
+            with as_outside():
+                return _found(eqx.combine(plain, rest), start, None, tol, slices)
+
+        x = jax.pure_callback(search, _shapes(model, slices), numbers, vmap_method="sequential")
     return readings(model, _attached(x, model))
 
 
@@ -95,7 +97,7 @@ def _over_a_slope(x: Unknowns, model: FreeWake) -> HarmonicInverse:
 
 def _found(model: FreeWake, start: Solution | None, progress: Progress | None, tol: float, slices: int) -> Unknowns:
     """The unknowns of a converged search, of K slices. Raises InputError where it does not converge."""
-    with jax.ensure_compile_time_eval():  # numbers all the way, whatever traces are open around this
+    with eval_context():  # numbers all the way, whatever traces are open around this
         found = on_host.solve(jax.tree.map(jnp.asarray, model), start, progress, tol)
     if not found.converged:
         raise InputError(

@@ -12,6 +12,7 @@ import pytest
 from wakes import COARSE
 
 from rotorjax.ground import plane
+from rotorjax.wake import sensitivity
 from rotorjax.wake.equilibrium import evaluate
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import wake_settings
@@ -50,6 +51,17 @@ def test_a_wake_takes_few_programs(uh60, coarse, programs):
     programs.clear()
     assert solve(high, hover).converged
     assert not programs
+
+
+@pytest.mark.calls_host
+def test_a_search_under_jit_takes_the_programs_of_one_outside(uh60, coarse, programs):
+    """jax calls the host with other settings and arrays than its user has, for which all would be traced anew."""
+    found = solve(free_wake(*uh60, plane(1.0), coarse))
+    programs.clear()
+    thrust = jax.jit(lambda height: sensitivity.solve(free_wake(*uh60, plane(height), coarse), start=found).CT)
+    assert float(thrust(1.0)) == pytest.approx(found.CT, rel=1e-6)
+    assert "jit(thrust)" in programs or "jit(<lambda>)" in programs
+    assert not {"jit(_linearised)", "jit(_product)"} & set(programs), programs
 
 
 def misses(call):
