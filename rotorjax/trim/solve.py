@@ -70,7 +70,7 @@ def flight(
 def most_thrust(p: CoupledRotor, advance: float) -> float:
     """C_T that no inflow can exceed: every section at the greatest lift of its table, all round the disk."""
     sections = sections_of(p)
-    most = np.max(p.rotor.airfoil.cl)
+    most = np.max(np.asarray(p.rotor.airfoil.cl))  # of numpy: of jax's own array it would be a program
     r, widths, lifting = (np.asarray(v) for v in (sections.r, sections.widths, sections.lifting))
     dynamic = 0.5 * np.asarray(chord(p.rotor, sections.r)) * (r**2 + advance**2 / 2)
     return float(p.rotor.blades / np.pi * most * np.sum(dynamic * widths * lifting))

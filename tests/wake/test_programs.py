@@ -59,8 +59,8 @@ def test_a_search_under_jit_takes_the_programs_of_one_outside(uh60, coarse, prog
     found = solve(free_wake(*uh60, plane(1.0), coarse))
     programs.clear()
     thrust = jax.jit(lambda height: sensitivity.solve(free_wake(*uh60, plane(height), coarse), start=found).CT)
-    assert float(thrust(1.0)) == pytest.approx(found.CT, rel=1e-6)
-    assert "jit(thrust)" in programs or "jit(<lambda>)" in programs
+    assert float(thrust(1.0)) == pytest.approx(found.CT, rel=1e-9)  # it begins where it ends
+    assert "jit(<lambda>)" in programs
     assert not {"jit(_linearised)", "jit(_product)"} & set(programs), programs
 
 
