@@ -24,20 +24,22 @@ from rotorjax.wake.start import laid_level, prescribed, with_the_ground
 
 Progress = Callable[[str, float], None]
 
-STEEPER, GENTLER = np.deg2rad(7.5), np.deg2rad(1.0)
+STEEPER, GENTLER = np.deg2rad(10.0), np.deg2rad(1.0)
 """Most that the ground tilts in a step of a continuation, and a step that is tried however far it goes."""
 
 SMALLEST = 0.05
 """Least step of a continuation over the whole way; less on a long way to a steep ground (GENTLER)."""
 
-NEAR, PASSES = 2e-3, 200
-"""Residual from which Newton's method takes over from Anderson's, and passes after which it does so anyway. A pass is a
-tenth of one of Newton's iterations, and from a rough guess these wander.
+NEAR, LEFT, PASSES = 2e-3, 0.1, 200
+"""Residual from which Newton's method takes over from Anderson's, share of the first residual that has to be left by
+then, and passes after which it takes over anyway. A pass is a tenth of one of Newton's iterations, and from a rough
+guess these wander. A neighbour's wake at another pitch has a small residual from the start, but where it is wrong it is
+as wrong as any: passes find its slow modes, and two iterations of Newton's do what ten did not.
 """
 
-MOST, MOST_SLICES = 10, 16
+MOST, MOST_SLICES, FEW = 10, 16, 5
 """Newton iterations at one model, of an axisymmetric wake and of all slices: what takes more is found sooner by a
-smaller step of the continuation.
+smaller step of the continuation. FEW: where the passes did not come near and there is no preconditioner.
 """
 
 CLOSING, MORE = 0.25, 5
@@ -61,6 +63,7 @@ class Search:
     """The way so far: whether it still goes on, whether the user ended it, why it ended, and what it took.
 
     inverse: the preconditioner at hand. hard: whether an axisymmetric wake, which is mostly found without, needs one.
+    at_once: move to another model in one step or not at all.
     """
 
     tol: float
@@ -72,6 +75,7 @@ class Search:
     residuals: list[float] = field(default_factory=list)
     inverse: HarmonicInverse | None = None
     hard: bool = False
+    at_once: bool = False
 
     def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
@@ -102,15 +106,17 @@ class Search:
         found = self.from_guess(light, prescribed(light), self.tol)
         self.note("half the pitch", found)
         self.ok, self.why = found.converged, found.why
-        return self.move(light, model, found.x, "more pitch") if self.ok else (light, found.x)
+        return self.move(light, model, found.x, "more pitch", 0.5) if self.ok else (light, found.x)
 
     def by_way_of_washout(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model by way of the auxiliary flow, which is taken back."""
         guess = prescribed(model, WASHOUT + 0.03)
         return self.follow(lambda s: with_washout(model, WASHOUT * (1 - s)), guess, "less auxiliary flow", 0.4)
 
-    def move(self, here: FreeWake, there: FreeWake, x: Unknowns, stage: str) -> tuple[FreeWake, Unknowns]:
-        """Follow the branch from one model to another of the same structure."""
+    def move(
+        self, here: FreeWake, there: FreeWake, x: Unknowns, stage: str, first: float = 1.0
+    ) -> tuple[FreeWake, Unknowns]:
+        """Follow the branch from one model to another of the same structure; first: share of the way tried first."""
         here, there = on_host(here), on_host(there)
         if all(np.array_equal(a, b) for a, b in zip(jax.tree.leaves(here), jax.tree.leaves(there), strict=True)):
             return self.settle(there, x)
@@ -126,8 +132,9 @@ class Search:
             return eqx.tree_at(lambda m: m.ground.height, model, np.asarray(height))
 
         tilt = 0.0 if there.ground is None or here.ground is None else float(there.ground.slope - here.ground.slope)
-        first, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
-        return self.follow(between, x, stage, first, min(last, SMALLEST), first)
+        largest, last = (min(1.0, step / max(abs(tilt), 1e-9)) for step in (STEEPER, GENTLER))
+        least = largest if self.at_once else min(last, SMALLEST)
+        return self.follow(between, x, stage, min(first, largest), least, largest)
 
     def among(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """From the wake of `model.levelled`, over K slices, to the surfaces: at once, or as their flow comes up.
@@ -186,15 +193,17 @@ class Search:
         """Newton-Krylov from a guess, an axisymmetric one first brought near by passes of the fixed point."""
         if x.near.shape[0] > 1:
             return self.newton(model, x, tol)
-        near = anderson(told, x, model, mixing=0.1, window=20, tol=NEAR, max_iterations=PASSES, linear=METHOD)
-        return self.newton(model, near.x, tol)
+        first = anderson(told, x, model, max_iterations=0, linear=METHOD).residual
+        enough = min(NEAR, max(LEFT * first, tol))
+        near = anderson(told, x, model, mixing=0.1, window=20, tol=enough, max_iterations=PASSES, linear=METHOD)
+        return self.newton(model, near.x, tol, MOST if near.converged or self.hard else FEW)
 
-    def newton(self, model: FreeWake, x: Unknowns, tol: float, effort: int = 120) -> Outcome:
+    def newton(self, model: FreeWake, x: Unknowns, tol: float, most: int | None = None, effort: int = 120) -> Outcome:
         """Newton-Krylov at one model, with at most `effort` products with the Jacobian an iteration."""
         level = x.near.shape[0] == 1
         # over a slope the preconditioner is of another wake than this one, and no gauge
         linear = replace(METHOD, precondition=self.inverse, natural=level, restart=effort)
-        most = MOST if level else MOST_SLICES
+        most = most or (MOST if level else MOST_SLICES)
         found = newton(told, x, model, linear=linear, tol=tol, max_iterations=most if effort > 1 else 1)
         if found.converged or found.iterations < most or found.residuals[-1] > CLOSING * found.residuals[-2]:
             return found

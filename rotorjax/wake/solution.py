@@ -113,20 +113,30 @@ def solve(
     """Find the periodic wake of a model, from a prescribed wake or from the solution of a neighbouring case.
 
     start: a solution with the same rotor and settings; used where both have ground, or neither. Where the way from it
-    is lost, the one from nothing is tried. progress(stage, residual) is called after each continuation step. tol:
-    relative rms of the residual. A solve that does not get there comes back with `converged` False, the reason, and the
-    last good state.
+    is lost, the one from nothing is tried; a level wake is sought from it at once first, in small steps last.
+    progress(stage, residual) is called after each continuation step. tol: relative rms of the residual. A solve that
+    does not get there comes back with `converged` False, the reason, and the last good state.
     """
-    clock, search = Clock(), Search(tol, progress)
+    clock = Clock()
     near = start if start is not None and start.converged and _fits(start, model) else None
+    search = Search(tol, progress, at_once=near is not None and model.axisymmetric)
     here, x = _way(model, near, search)
-    if near is not None and not search.ok and not search.interrupted:
+    for other in _other_ways(near, search.at_once):
+        if search.ok or search.interrupted:
+            break
         again = Search(tol, progress, iterations=search.iterations)
-        there, y = _way(model, None, again)
+        there, y = _way(model, other, again)
         nearer = _is_case(there, model) and not _is_case(here, model)
         if again.ok or again.interrupted or nearer:
             here, x, search = there, y, again
     return read(here, x, search, clock)
+
+
+def _other_ways(near: Solution | None, at_once: bool) -> tuple[Solution | None, ...]:
+    """Where a search starts anew that was lost on its way from `near`, in small steps from there last."""
+    if near is None:
+        return ()
+    return (None, near) if at_once else (None,)
 
 
 def _is_case(here: FreeWake, model: FreeWake) -> bool:

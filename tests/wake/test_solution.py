@@ -121,18 +121,18 @@ def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover,
 
 
 def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monkeypatch):
-    """And where that is lost, too, keeps what the neighbour gave."""
-    move, stages = search.Search.move, []
+    """Then in small steps from the neighbour; where all are lost it keeps what the first gave."""
+    move, at_once, losses = search.Search.move, [], 1
 
     def lost_first(self, here, there, x, stage):
-        stages.append(stage)
-        self.ok, self.why = len(stages) > 1, "lost"
+        at_once.append(self.at_once)
+        self.ok, self.why = len(at_once) > losses, "lost"
         return move(self, here, there, x, stage) if self.ok else (here, x)
 
     monkeypatch.setattr(search.Search, "move", lost_first)
     higher = eqx.tree_at(lambda m: m.ground.height, grounded.model, jnp.asarray(1.1))
     found = solve(higher, start=grounded)
-    assert len(stages) == 2
+    assert at_once == [True, False]
     assert found.converged, found.why
     np.testing.assert_allclose(float(found.model.ground.height), 1.1)
     assert found.CT < grounded.CT
@@ -142,7 +142,14 @@ def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monk
         return grounded.model, grounded.unknowns
 
     monkeypatch.setattr(search.Search, "from_nothing", nowhere)
-    stages.clear()
+    at_once.clear()
+    step_by_step = solve(higher, start=grounded)
+    assert at_once == [True, False]
+    assert step_by_step.converged, step_by_step.why
+    np.testing.assert_allclose(step_by_step.CT, found.CT, rtol=1e-6)
+
+    at_once.clear()
+    losses = 2
     lost = solve(higher, start=grounded)
     assert (lost.converged, lost.why) == (False, "lost")
     assert float(lost.model.ground.height) == 1.0
@@ -152,5 +159,15 @@ def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monk
         return model, grounded.unknowns
 
     monkeypatch.setattr(search.Search, "from_nothing", stalls_there)
-    stages.clear()
+    at_once.clear()
     assert solve(higher, start=grounded).why == "stalled"  # at the case itself, which the neighbour's way did not reach
+
+
+def test_a_wake_at_another_pitch_is_found_from_its_neighbour_in_a_few_iterations(uh60, coarse, hover):
+    """Its residual is small from the start, and Newton's method alone does not get there."""
+    rotor, operating = uh60
+    gentler = eqx.tree_at(lambda o: o.collective, operating, operating.collective - np.deg2rad(2.0))
+    found = solve(free_wake(rotor, gentler, None, coarse), start=hover)
+    assert found.converged, found.why
+    assert found.iterations <= 4
+    np.testing.assert_allclose(found.CT, solve(free_wake(rotor, gentler, None, coarse)).CT, rtol=1e-5)
