@@ -1,11 +1,11 @@
-"""Tasks that need each other's results, worked off by a few threads in order.
+"""Tasks that need others' results, worked off by a few threads in order.
 
 Most of a study's time is compilation, which XLA does in one thread without holding Python's lock: two threads that each
 compile another kind of case halve it on two cores.
 """
 
 import threading
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from typing import Generic, TypeVar
 
 Task = TypeVar("Task", bound=Hashable)
@@ -16,8 +16,28 @@ class Stopped(Exception):
     """Raised in a worker's own callbacks once the schedule is being abandoned."""
 
 
+def longest_chain_first(
+    tasks: Sequence[Task], needs: Mapping[Task, Collection[Task]], lengths: Mapping[Task, float]
+) -> list[Task]:
+    """Tasks by how long it takes to work them off and what waits for them, one after the other, longest first.
+
+    Those that take as long stay in order.
+    """
+    chains = dict(lengths)
+
+    def lengthen(task: Task) -> None:
+        for need in needs[task]:
+            if chains[need] < lengths[need] + chains[task]:
+                chains[need] = lengths[need] + chains[task]
+                lengthen(need)
+
+    for task in tasks:
+        lengthen(task)
+    return sorted(tasks, key=lambda task: -chains[task])
+
+
 class Schedule(Generic[Task, Result]):
-    """Works off `tasks`, the first ready one first; a task is ready when the task it `needs` (or None) is done.
+    """Works off `tasks`, the first ready one first; a task is ready when all that it `needs` are done.
 
     work(task, done) makes a result from those done so far; keep(task, result) is called for one at a time.
     """
@@ -25,7 +45,7 @@ class Schedule(Generic[Task, Result]):
     def __init__(
         self,
         tasks: Sequence[Task],
-        needs: Callable[[Task], Task | None],
+        needs: Mapping[Task, Collection[Task]],
         work: Callable[[Task, dict[Task, Result]], Result],
         keep: Callable[[Task, Result], None],
     ) -> None:
@@ -82,7 +102,7 @@ class Schedule(Generic[Task, Result]):
         with self._change:
             while self._waiting and not self.stopping and not self._errors:
                 for task in self._waiting:
-                    if (need := self._needs(task)) is None or need in self._done:
+                    if all(need in self._done for need in self._needs[task]):
                         self._waiting.remove(task)
                         return task
                 self._change.wait()

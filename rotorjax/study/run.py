@@ -63,7 +63,7 @@ def solve_cases(
             if not bool(data["converged"]):
                 bar.write(f"{case.label} did not converge: {data.attrs['why']}")
 
-        schedule = Schedule(todo, lambda case: _needed(case, cases, found), work, keep)
+        schedule = Schedule(todo, {case: _needed(case, cases, found) for case in todo}, work, keep)
         if solver is solve and workers > 1 and todo and todo[0].height is None:
             Thread(target=_rehearse, args=(todo, settings), daemon=True).start()
         done = found | schedule.run(workers)
@@ -80,10 +80,10 @@ def _rehearse(todo: Sequence[Case], settings: StudySettings) -> None:
             add_finite_state(wake_file.to_dataset(of_kind[0], solution, settings), settings)
 
 
-def _needed(case: Case, cases: Sequence[Case], found: dict[Case, xr.Dataset]) -> Case | None:
-    """The case that has to be solved before this one; None where none has."""
+def _needed(case: Case, cases: Sequence[Case], found: dict[Case, xr.Dataset]) -> tuple[Case, ...]:
+    """The case that has to be solved before this one, where one has."""
     near = neighbour(case, cases[: cases.index(case)])
-    return None if near in found else near
+    return () if near is None or near in found else (near,)
 
 
 def solve_case(

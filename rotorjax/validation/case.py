@@ -41,7 +41,7 @@ class Comparison:
 class ValidationCase:
     """One comparison. points: the wakes that it needs, each before those that start from it. compare: rows and picture.
 
-    known: what is known about rows of it that are out.
+    known: what is known about rows of it that are out. length: how long a comparison takes, in wakes.
     """
 
     name: str
@@ -49,3 +49,4 @@ class ValidationCase:
     points: Callable[[Subject], Sequence[Point]]
     compare: Callable[[Subject, Wakes], Comparison]
     known: str = ""
+    length: float = 0.1

@@ -21,7 +21,7 @@ COARSE = Against(
     "the same with the settings of all other rows", "the solver's tolerance, 1e-7", "the aim set for this wake"
 )
 WORDS = {"panels": "panels", "age_step_deg": "age step", "free_turns": "free turns"}
-HEIGHTS, SLOPED = (2.0, 1.5, 1.0, 0.5), 1.0
+HEIGHTS, SLOPED = (2.0, 1.5, 1.0, 0.75, 0.5), 1.0
 SLOPES_DEG = (10.0, 20.0, 30.0)
 """Slopes over which first harmonics are compared, too."""
 THRUST, INFLOW, HARMONIC = 0.007, 0.01, 0.1

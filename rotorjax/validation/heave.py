@@ -219,5 +219,5 @@ KNOWN = (
     "and back to 0.52. So the free wake lags more here too. The dynamic variant has its size up to 1/rev; the "
     "quasi-steady one is up to 41 % smaller."
 )
-CASE = ValidationCase(NAME, "Heave over level ground", points, compare, KNOWN)
+CASE = ValidationCase(NAME, "Heave over level ground", points, compare, KNOWN, length=5.0)
 """Free wake and finite-state model in one case: no measurement, but two models that share nothing but the sections."""

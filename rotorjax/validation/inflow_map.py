@@ -219,4 +219,4 @@ KNOWN = (
     "The collective's reference radius is not stated with the data: the reported 9.37° is neither the trimmed pitch at "
     "0.75 R nor that at the axis."
 )
-CASE = ValidationCase(NAME, "Elliott and Althoff's rotor at advance ratio 0.15", points, compare, KNOWN)
+CASE = ValidationCase(NAME, "Elliott and Althoff's rotor at advance ratio 0.15", points, compare, KNOWN, length=5.0)

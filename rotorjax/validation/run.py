@@ -1,4 +1,4 @@
-"""Validation: solve the wakes that the cases ask for, two at a time, and compare."""
+"""Validation: solve the wakes that the cases ask for and compare, two at a time."""
 
 import sys
 import time
@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 
 from tqdm import tqdm
 
-from rotorjax.bench.schedule import Schedule
+from rotorjax.bench.schedule import Schedule, longest_chain_first
 from rotorjax.bench.single import Solver
 from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.point import Point, needed
 from rotorjax.validation.row import Row
 from rotorjax.wake.solution import Solution, solve
+
+Task = Point | ValidationCase
 
 
 @dataclass(frozen=True)
@@ -44,48 +46,52 @@ def validate(
     solver: Solver = solve,
     workers: int = 2,
 ) -> Validation:
-    """Solve all wakes of the cases and compare. Every row that is read from a wake that did not converge is out.
+    """Solve all wakes of the cases, each from the nearest one before it, and compare each case once it has its own.
+
+    Every row that is read from a wake that did not converge is out.
 
     show: progress bar on stderr. workers: threads. Raises InputError where a rotor or a setting is not allowed.
     """
     started = time.perf_counter()
-    wakes = solve_points(_ordered(cases, subject), subject.quick, show=show, solver=solver, workers=workers)
-    compared = tuple(_compare(case, subject, wakes) for case in cases)
-    return Validation(subject, tuple(cases), compared, wakes, time.perf_counter() - started)
+    points = list(dict.fromkeys(p for case in cases for p in case.points(subject)))
+    models = {at: at.model(subject.quick) for at in points}
+    needs: dict[Task, tuple[Task, ...]] = {task: _needs(task, points, subject) for task in (*cases, *points)}
+    with tqdm(total=len(needs), desc="validate", unit="step", disable=not show, file=sys.stderr) as bar:
 
+        def work(task: Task, done: dict[Task, Solution | Comparison]) -> Solution | Comparison:
+            found = _wakes(done, needs[task])
+            if isinstance(task, ValidationCase):
+                return _compare(task, subject, found)
 
-def solve_points(
-    tasks: Sequence[Point], quick: bool, *, show: bool = True, solver: Solver = solve, workers: int = 2
-) -> dict[Point, Solution]:
-    """Solve wakes in order, each from the nearest one before it; the same settings for all of them.
-
-    Raises InputError where a rotor or a setting is not allowed.
-    """
-    models = {task: task.model(quick) for task in tasks}
-    with tqdm(total=len(tasks), desc="validate", unit="wake", disable=not show, file=sys.stderr) as bar:
-
-        def work(task: Point, done: dict[Point, Solution]) -> Solution:
             def progress(stage: str, residual: float) -> None:
                 schedule.check()
                 bar.set_postfix_str(f"{task.label}: {stage}, residual {residual:.1e}")
 
-            near = needed(task, tasks)
-            start = None if near is None or not done[near].converged else done[near]
+            start = next((near for near in found.values() if near.converged), None)
             return solver(models[task], start, progress)
 
-        def keep(task: Point, solution: Solution) -> None:
+        def keep(task: Task, found: Solution | Comparison) -> None:
             bar.update(1)
-            if not solution.converged:
-                bar.write(f"{task.label} did not converge: {solution.why}", file=sys.stderr)
+            if isinstance(task, Point) and isinstance(found, Solution) and not found.converged:
+                bar.write(f"{task.label} did not converge: {found.why}", file=sys.stderr)
 
-        schedule = Schedule(tasks, lambda task: needed(task, tasks), work, keep)
-        return schedule.run(workers)
+        lengths = {task: task.length if isinstance(task, ValidationCase) else 1.0 for task in needs}
+        schedule = Schedule(longest_chain_first(list(needs), needs, lengths), needs, work, keep)
+        done = schedule.run(workers)
+    compared = tuple(found for case in cases if isinstance(found := done[case], Comparison))
+    return Validation(subject, tuple(cases), compared, _wakes(done, points), time.perf_counter() - started)
 
 
-def _ordered(cases: Sequence[ValidationCase], subject: Subject) -> list[Point]:
-    """All points once: those that start from nothing first, since compiling takes longest, the others as they come."""
-    every = list(dict.fromkeys(p for case in cases for p in case.points(subject)))
-    return sorted(every, key=lambda p: needed(p, every) is not None)
+def _wakes(done: dict[Task, Solution | Comparison], tasks: Sequence[Task]) -> dict[Point, Solution]:
+    return {at: found for at in tasks if isinstance(at, Point) and isinstance(found := done[at], Solution)}
+
+
+def _needs(task: Task, points: Sequence[Point], subject: Subject) -> tuple[Point, ...]:
+    """What a case compares; what a wake starts from."""
+    if isinstance(task, ValidationCase):
+        return tuple(task.points(subject))
+    near = needed(task, points)
+    return () if near is None else (near,)
 
 
 def _compare(case: ValidationCase, subject: Subject, wakes: dict[Point, Solution]) -> Comparison:

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
-from rotorjax.bench.schedule import Schedule
+from rotorjax.bench.schedule import Schedule, longest_chain_first
 
-NEEDS = {"a": None, "b": None, "c": "a", "d": "b", "e": "d"}
+NEEDS = {"a": "", "b": "", "c": "a", "d": "b", "e": "da"}
 
 
 @pytest.mark.parametrize("workers", [1, 2, 4])
@@ -15,17 +15,24 @@ def test_order(workers):
     kept = []
 
     def work(task, done):
-        assert NEEDS[task] is None or NEEDS[task] in done
+        assert set(NEEDS[task]) <= set(done)
         return task.upper()
 
-    schedule = Schedule(list(NEEDS), NEEDS.get, work, lambda task, result: kept.append(task))
+    schedule = Schedule(list(NEEDS), NEEDS, work, lambda task, result: kept.append(task))
     assert schedule.run(workers) == {task: task.upper() for task in NEEDS}
     assert sorted(kept) == sorted(NEEDS)
 
 
+def test_the_longest_chain_is_first():
+    alike = dict.fromkeys(NEEDS, 1.0)
+    assert longest_chain_first(list(NEEDS), NEEDS, alike) == ["b", "a", "d", "c", "e"]
+    assert longest_chain_first(list("edcba"), NEEDS, alike) == ["b", "d", "a", "e", "c"]
+    assert longest_chain_first(list(NEEDS), NEEDS, alike | {"c": 5.0}) == ["a", "c", "b", "d", "e"]
+
+
 def test_two_workers_work_at_the_same_time():
     meeting = threading.Barrier(2, timeout=10)
-    Schedule(["a", "b"], NEEDS.get, lambda task, done: meeting.wait(), lambda task, result: None).run(2)
+    Schedule(["a", "b"], NEEDS, lambda task, done: meeting.wait(), lambda task, result: None).run(2)
 
 
 def test_an_error_ends_everything():
@@ -36,7 +43,7 @@ def test_an_error_ends_everything():
             raise ValueError("no c")
         return task
 
-    schedule = Schedule(list(NEEDS), NEEDS.get, work, lambda task, result: kept.append(task))
+    schedule = Schedule(list(NEEDS), NEEDS, work, lambda task, result: kept.append(task))
     with pytest.raises(ValueError, match="no c"):
         schedule.run(1)
     assert kept == ["a", "b"]
@@ -53,7 +60,7 @@ def test_an_interrupt_stops_workers_at_their_next_check(monkeypatch):
         finally:
             ended.set()
 
-    schedule = Schedule(["a"], NEEDS.get, work, lambda task, result: pytest.fail("kept"))
+    schedule = Schedule(["a"], NEEDS, work, lambda task, result: pytest.fail("kept"))
 
     class Interrupting(threading.Thread):
         def join(self, timeout=None):
