@@ -12,7 +12,7 @@ from rotorjax.validation.row import Against, Row, absolute, between, relative
 from rotorjax.wake.solution import Solution
 
 NAME = "march"
-SIZE, TURNS = 1e-5, 4.0
+SIZE, TURNS = 1e-5, 5.0
 """Random displacement of the nodes at the start (rms over R), and revolutions that are marched."""
 LINEAR = 1e-3
 """Displacement up to which the disturbance counts as small."""

@@ -129,6 +129,7 @@ def solve(
         nearer = _is_case(there, model) and not _is_case(here, model)
         if again.ok or again.interrupted or nearer:
             here, x, search = there, y, again
+        search.iterations = again.iterations  # of all ways
     return read(here, x, search, clock)
 
 

@@ -164,10 +164,10 @@ def test_a_solve_that_is_lost_from_a_neighbour_tries_from_nothing(grounded, monk
 
 
 def test_a_wake_at_another_pitch_is_found_from_its_neighbour_in_a_few_iterations(uh60, coarse, hover):
-    """Its residual is small from the start, and Newton's method alone does not get there."""
+    """Its residual is small from the start, and Newton's method alone does not get there at once: twelve iterations."""
     rotor, operating = uh60
     gentler = eqx.tree_at(lambda o: o.collective, operating, operating.collective - np.deg2rad(2.0))
     found = solve(free_wake(rotor, gentler, None, coarse), start=hover)
     assert found.converged, found.why
     assert found.iterations <= 4
-    np.testing.assert_allclose(found.CT, solve(free_wake(rotor, gentler, None, coarse)).CT, rtol=1e-5)
+    np.testing.assert_allclose(found.CT, solve(free_wake(rotor, gentler, None, coarse)).CT, rtol=1e-6)
