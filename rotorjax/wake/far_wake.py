@@ -26,9 +26,9 @@ under the hub of a rotor close to the ground, must not be repeated through the d
 HIGH = 20.0
 """Where sinh x is e^x/2 to rounding."""
 
-FARTHEST = {4: 1e4, 8: 1e30}
-"""How much wider than the last free turn, by bytes of a number, the closure over ground gets: the eighth power of a
-distance must not overflow. What lies there induces nothing."""
+FARTHEST = {4: 1e8, 8: 1e60}
+"""How much thinner than under the last free turn, by bytes of a number, the layer under the turns to come gets: what
+lies there induces nothing."""
 
 LEAST = 0.005
 """Height over R that a turn's mean does not fall below: a search may put it under the plane."""
@@ -62,11 +62,11 @@ def closure(model: FreeWake, nodes: Float[Array, "F P+1 3"], psi: Float[Array, "
 
     Out of ground effect the turn moves on by its own pitch, and with the wind. Over ground it comes down at a speed
     that goes as tanh(z/REACH), so at a steady one far above the plane and as in a stagnation flow next to it, and its
-    radius grows so that the flow through it is kept. A jet that meets the plane aslant keeps what moves it along the
-    plane: it comes down along the shaft and runs off downhill, and the stagnation point lies uphill. As h → ∞ all this
-    becomes the first. A wake cut off without closure expands and bunches at its end and pulls the inflow at the disk
-    with it. Over surfaces the plane is the rotor's floor (`FreeWake.floor`); what of it comes into a closed surface is
-    shut off there.
+    radius grows so that the flow through it is kept; far out it runs along the plane at a steady speed again. A jet
+    that meets the plane aslant keeps what moves it along the plane: it comes down along the shaft and runs off
+    downhill, and the stagnation point lies uphill. As h → ∞ all this becomes the first. A wake cut off without closure
+    expands and bunches at its end and pulls the inflow at the disk with it. Over surfaces the plane is the rotor's
+    floor (`FreeWake.floor`); what of it comes into a closed surface is shut off there.
     """
     turn = model.settings.old_segments_per_turn
     last, before = nodes[:, -turn - 1 :], nodes[:, -2 * turn - 1 : -turn]
@@ -108,13 +108,41 @@ def _over_plane(
     # what ln sinh x falls by in a turn is the same for every turn
     mean, mean_before = jnp.mean(x, axis=1), jnp.mean(_heights(before, normal, plane), axis=1) / REACH
     fall = after * (STEADY * jax.nn.softplus((_log_sinh(mean_before) - _log_sinh(mean)) / STEADY))[:, None, None]
-    fall = jnp.minimum(fall, 2 * np.log(FARTHEST[fall.dtype.itemsize]))
-    lower = _lowered(x[:, None], fall)
-    wider = jnp.exp(0.5 * (fall + _log_cosh(lower) - _log_cosh(x)[:, None]))
+    free = (2 * REACH / jnp.sqrt(jnp.mean(jnp.sum(flat**2, axis=-1), axis=1)))[:, None, None]
+    fall = _at_the_jets_speed(mean[:, None, None], free, fall)
+    lower, thinned = _lowered(x[:, None], fall), _thinned(x[:, None], fall)
+    wider = _widening(free, thinned)
     downhill = normal - np.array([0.0, 0.0, 1.0]) / normal[2]
-    run = REACH * _along(x[:, None], lower)[..., None] * downhill
+    run = REACH * _along(x[:, None], thinned, fall)[..., None] * downhill
     spread = (flat[:, None] + run) * wider[..., None] + REACH * lower[..., None] * normal
     return foot + after[..., None] * drift + spread
+
+
+def _at_the_jets_speed(
+    x: Float[Array, "F 1 1"], free: Float[Array, "F 1 1"], fall: Float[Array, "F K 1"]
+) -> Float[Array, "F K 1"]:
+    """What ln sinh of turns of mean height x falls by, from what it would in a stagnation flow.
+
+    There the speed along the plane grows for ever, as s = r/2REACH; a free jet's, the same close to the shaft, comes to
+    an end: s/(1 + s) = V/(f + V) for a turn that has grown to V of its radius r₀, f = 2REACH/r₀ (`free`). In the time
+    in which it would grow to W by the first it grows by the second to V with f ln V + V = 1 + (1 + f) ln W. What is
+    used is that within some per cent, V = 1 + (1 + f) ln((f + W)/(f + 1)): like W at first, a step a turn in the end.
+    """
+    thinned = _thinned(x, jnp.minimum(fall, np.log(FARTHEST[fall.dtype.itemsize])))
+    wide = 1 + (1 + free) * jnp.log((free + jnp.sqrt(thinned)) / (free + 1))
+    return fall - jnp.log(thinned * (free + wide) / (wide**2 * (1 + free)))
+
+
+def _thinned(x: Float[Array, "*#n"], fall: Float[Array, "*#n"]) -> Float[Array, "*#n"]:
+    """tanh x/tanh y where ln sinh y is that of x less `fall`: how much thinner the layer under a turn has become."""
+    small = jnp.exp(-2 * jnp.abs(x))  # tanh² + e^{2 fall}/cosh², whose cosh must not overflow
+    return jnp.sqrt((1 - small) ** 2 + 4 * small * jnp.exp(2 * fall)) / (1 + small)
+
+
+def _widening(free: Float[Array, "F 1 1"], thinned: Float[Array, "F K N"]) -> Float[Array, "F K N"]:
+    """V at which the flow under a turn is what it was, V²/(f + V) · tanh y = tanh x/(f + 1)."""
+    share = thinned / (1 + free)
+    return 0.5 * (share + jnp.sqrt(share * (share + 4 * free)))
 
 
 def _drift(along: Float[Array, " 3"], psi: Float[Array, ""]) -> Float[Array, " 3"]:
@@ -134,29 +162,21 @@ def _lowered(x: Float[Array, "*n"], fall: Float[Array, "*n"]) -> Float[Array, "*
 
     Odd in x, so a node that a search puts under the plane is no accident; sinh must not overflow high above it.
     """
-    high = x > HIGH
-    log = jnp.where(high, x - np.log(2.0) - fall, 0.0)
-    from_high = jnp.where(log > HIGH, log + np.log(2.0), jnp.arcsinh(jnp.exp(jnp.minimum(log, HIGH))))
-    return jnp.where(high, from_high, jnp.arcsinh(jnp.sinh(jnp.where(high, 0.0, x)) * jnp.exp(-fall)))
+    steady = x - fall
+    low = jnp.minimum(steady, HIGH)
+    return jnp.arcsinh(0.5 * (jnp.exp(low) - jnp.exp(-x - fall))) + steady - low
 
 
-def _along(x: Float[Array, "*n"], lower: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    """How far a uniform flow of speed 1 along the plane carries what falls from x to `lower` as dx/dt = −tanh x does.
+def _along(x: Float[Array, "*#n"], thinned: Float[Array, "*#n"], fall: Float[Array, "*#n"]) -> Float[Array, "*#n"]:
+    """How far a uniform flow of speed 1 along the plane carries what falls from x to y as dx/dt = −tanh x does.
 
-    In place of before it, that is over the widening √(tanh x/tanh lower): ∫ √(tanh y/tanh x)⁻¹ dt along the way, with
-    ∫ dy/√tanh y = artanh √tanh y + arctan √tanh y.
+    In place of before it, that is over the widening √(tanh x/tanh y): ∫ √(tanh y/tanh x) dt along the way. With
+    ∫ dy/√tanh y = artanh √tanh y + arctan √tanh y, artanh u as ½ ln((1 + u)² (1 + u²)/(1 − u⁴)), 1 − tanh² = cosh⁻².
     """
-    return (_slow_down(x) - _slow_down(lower)) / _root(x)
-
-
-def _slow_down(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    root = _root(x)
-    # artanh u as ½ ln((1 + u)² (1 + u²)/(1 − u⁴)), and 1 − tanh² = cosh⁻²
-    return jnp.log1p(root) + 0.5 * jnp.log1p(root**2) + _log_cosh(_lifted(x)) + jnp.arctan(root)
-
-
-def _root(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    return jnp.sqrt(jnp.tanh(_lifted(x)))
+    root = jnp.sqrt(jnp.tanh(_lifted(x)))
+    end = root / jnp.sqrt(thinned)
+    ratio = (1 + root) * jnp.sqrt(1 + root**2) / (thinned * (1 + end) * jnp.sqrt(1 + end**2))
+    return (jnp.log(ratio) + fall + jnp.arctan((root - end) / (1 + root * end))) / root
 
 
 def _lifted(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
@@ -167,10 +187,6 @@ def _lifted(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
 def _log_sinh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
     x = _lifted(x)
     return x + jnp.log(-0.5 * jnp.expm1(-2 * x))
-
-
-def _log_cosh(x: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    return jnp.logaddexp(x, -x) - np.log(2.0)
 
 
 def _heights(nodes: Float[Array, "*n 3"], normal: Float[Array, "3"], plane: Plane) -> Float[Array, "*n"]:

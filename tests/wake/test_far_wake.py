@@ -159,24 +159,37 @@ def test_far_above_a_plane_the_closure_is_that_of_free_air():
 
 @pytest.mark.parametrize("height", [0.8, 1.5, 3.0])
 def test_over_a_plane_it_stays_above_and_spreads_as_the_flow_through_it_is_kept(height):
-    """r² tanh(z/REACH) is the stream function of what comes down at −tanh(z/REACH)."""
+    """r²/(2 REACH + r) tanh(z/REACH) is the stream function of a jet that runs along the plane at a steady speed."""
     model = model_of(height)
     nodes = closure(model, helices(model), ZERO)
     z, r = nodes[..., 2] + height, jnp.hypot(nodes[..., 0], nodes[..., 1])
     assert float(jnp.min(z)) > 0
     per_turn = model.settings.steps_per_turn
     last = helices(model)[:, -per_turn:]
-    start = RADIUS**2 * jnp.tanh((last[..., 2] + height) / REACH)
+    start = RADIUS**2 / (2 * REACH + RADIUS) * jnp.tanh((last[..., 2] + height) / REACH)
     for turn in range(model.settings.closure_turns):
         here = slice(turn * per_turn, (turn + 1) * per_turn)
-        np.testing.assert_allclose((r**2 * jnp.tanh(z / REACH))[:, here], start, rtol=1e-10)
+        np.testing.assert_allclose((r**2 / (2 * REACH + r) * jnp.tanh(z / REACH))[:, here], start, rtol=1e-10)
         assert jnp.all(z[:, here] < last[..., 2] + height)
 
 
-def test_next_to_a_plane_every_turn_comes_down_by_the_same_ratio():
+def test_far_out_on_a_plane_turns_grow_by_one_step():
+    """By what a turn that widens as in a stagnation flow does at 2 REACH from the shaft, REACH times the fall."""
+    height, turns = 0.8, 30
+    model = model_of(height, closure_turns=turns, closure_bundles=0)
+    nodes, turn = helices(model), model.settings.steps_per_turn
+    last, before = (float(jnp.mean(nodes[0, a:b, 2])) for a, b in ((-turn - 1, None), (-2 * turn - 1, -turn)))
+    fall = np.log(np.sinh((before + height) / REACH) / np.sinh((last + height) / REACH))
+    found = closure(model, nodes, ZERO)[0].reshape(turns, turn, 3)
+    radius = np.hypot(found[..., 0], found[..., 1]).mean(axis=1)
+    own = 0.5 * (1 + RADIUS / (2 * REACH))  # what a stagnation flow has of the steady speed at the turn's own radius
+    np.testing.assert_allclose(np.diff(radius)[-5:], 2 * REACH * own * fall, rtol=0.01)
+
+
+def test_next_to_a_plane_a_narrow_turn_comes_down_by_the_same_ratio():
     """A stagnation flow: heights fall by one ratio, radii grow by the root of its inverse."""
     model = model_of(0.56, free_turns=2.0, closure_turns=3, closure_bundles=0)
-    nodes = 0.02 * helices(model)  # a wake far smaller than REACH …
+    nodes = helices(model) * np.array([1e-6, 1e-6, 0.02])  # a wake far smaller than REACH …
     low = nodes.at[..., 2].add(-0.55)  # … right above the plane
     turn = model.settings.steps_per_turn
     found = closure(model, low, ZERO).reshape(model.settings.filaments, 3, turn, 3)
@@ -193,8 +206,10 @@ def over_slope(height, slope_deg, **settings):
     )
 
 
-def test_over_a_slope_nodes_follow_a_jet_that_comes_down_along_the_shaft():
-    """The flow next to the plane, integrated: normal −tanh n; along it x/2 cosh² n less tan δ that it came with."""
+def test_over_a_slope_turns_come_down_along_the_shaft_and_run_off_downhill():
+    """In the flow next to the plane, integrated: normal to it −tanh n; along it x/2 cosh² n less the tan δ that it came
+    with. By how much of its size it has run off by the height that it has come to is that of a turn.
+    """
     height, slope = 1.5, 20.0
     model = over_slope(height, slope, closure_turns=3, closure_bundles=0)
     nodes, turn = helices(model), model.settings.steps_per_turn
@@ -212,14 +227,14 @@ def test_over_a_slope_nodes_follow_a_jet_that_comes_down_along_the_shaft():
         spread = 0.5 / np.cosh(y[2]) ** 2
         return [spread * y[0] - np.tan(np.deg2rad(slope)), spread * y[1], -np.tanh(y[2])]
 
-    last, before = (np.mean(on_plane(nodes[0, a:b])[2]) for a, b in ((-turn - 1, None), (-2 * turn - 1, -turn)))
-    time = np.log(np.sinh(before) / np.sinh(last))
     found = closure(model, nodes, ZERO)[0].reshape(3, turn, 3)
     for k in (1, 3):
         for i in (1, 7, 20):
-            start = on_plane(nodes[0, -turn - 1 + i])
-            end = solve_ivp(flow, (0, k * time), start, rtol=1e-10, atol=1e-12).y[:, -1]
-            np.testing.assert_allclose(on_plane(found[k - 1, i - 1]), end, atol=1e-3)
+            start, end = on_plane(nodes[0, -turn - 1 + i]), on_plane(found[k - 1, i - 1])
+            time = np.log(np.sinh(start[2]) / np.sinh(end[2]))
+            there = solve_ivp(flow, (0, time), start, rtol=1e-10, atol=1e-12).y[:, -1]
+            np.testing.assert_allclose(end[2], there[2], rtol=1e-7)
+            np.testing.assert_allclose(end[0] / end[1], there[0] / there[1], rtol=1e-3)
 
 
 def test_far_above_a_slope_the_closure_is_that_of_free_air():
