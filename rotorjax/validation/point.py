@@ -8,9 +8,10 @@ from rotorjax.bench.settings import StudySettings, study_settings
 from rotorjax.ground import plane
 from rotorjax.rotor import catalogue
 from rotorjax.wake.model import FreeWake, free_wake
-from rotorjax.wake.settings import MARCHED
+from rotorjax.wake.settings import MARCHED, hover_settings
 
 AS_MARCHED = tuple(sorted(MARCHED.items()))
+DEFAULT_TURNS = hover_settings().free_turns
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,12 @@ class Point:
         others = [c for c in self.changes if not (marched and c in AS_MARCHED)]
         more = (", as marched" if marched else "") + "".join(f", {name} {value:g}" for name, value in others)
         return f"{self.rotor} {self.collective_deg:g}°, {place}{more}"
+
+    @property
+    def length(self) -> float:
+        """About how long it takes to solve, over a wake above level ground with the default settings."""
+        turns = dict(self.changes).get("free_turns", DEFAULT_TURNS) / DEFAULT_TURNS
+        return turns**2 * (6.0 if self.slope_deg else 1.0)
 
     def settings(self, quick: bool) -> StudySettings:
         """Rotor, operating point and settings of the wake. Raises InputError where one is not allowed."""

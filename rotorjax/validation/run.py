@@ -75,7 +75,7 @@ def validate(
             if isinstance(task, Point) and isinstance(found, Solution) and not found.converged:
                 bar.write(f"{task.label} did not converge: {found.why}", file=sys.stderr)
 
-        lengths = {task: task.length if isinstance(task, ValidationCase) else 1.0 for task in needs}
+        lengths = {task: task.length for task in needs}
         schedule = Schedule(longest_chain_first(list(needs), needs, lengths), needs, work, keep)
         done = schedule.run(workers)
     compared = tuple(found for case in cases if isinstance(found := done[case], Comparison))

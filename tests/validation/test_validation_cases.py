@@ -16,9 +16,10 @@ from rotorjax.validation.case import Comparison, Subject, ValidationCase
 from rotorjax.validation.cases import CASES, chosen_cases
 from rotorjax.validation.measure import disk_inflow, far_pitch, first_harmonic, section_lift, tip_path
 from rotorjax.validation.measured_power import measured_power_factor
-from rotorjax.validation.point import needed, point, twist_of
+from rotorjax.validation.point import Point, needed, point, twist_of
 from rotorjax.validation.row import Row, between
 from rotorjax.validation.run import _compare
+from rotorjax.wake.settings import MARCHED
 
 
 def test_the_tip_vortex_starts_on_the_blade_and_is_the_solutions_own(coarse_hover):
@@ -167,14 +168,22 @@ def test_a_straight_path_has_its_pitch():
 
 def test_no_ground_is_infinitely_far(coarse_hover):
     assert coarse_hover.clearance == np.inf
-    assert ground.inflow_ratio(coarse_hover, coarse_hover) == 1
-    assert ground.power_ratio(coarse_hover, coarse_hover) == 1
+    alone = coarse_hover, replace(coarse_hover, CT=1.3 * coarse_hover.CT)
+    assert ground.inflow_ratio(coarse_hover, alone) == 1
+    assert ground.power_ratio(coarse_hover, alone) == 1
 
 
 def test_the_power_ratio_is_that_at_constant_thrust(coarse_hover):
-    """Twice the thrust with 2^1.5 times 0.8 of the induced power is a rotor that needs 0.8 of it at the same thrust."""
-    near = replace(coarse_hover, CT=2 * coarse_hover.CT, CP_induced=0.8 * 2**1.5 * coarse_hover.CP_induced)
-    assert ground.power_ratio(near, coarse_hover) == pytest.approx(0.8)
+    """What it takes out of ground effect at the thrust near the ground is read off two collectives."""
+
+    def wake(thrust, power):  # over those of the coarse hover
+        return replace(
+            coarse_hover, CT=thrust * coarse_hover.CT, CP_induced=power * thrust**1.5 * coarse_hover.CP_induced
+        )
+
+    alone = wake(1, 1), wake(1.5, 1.04)
+    assert ground.power_ratio(wake(1.25, 0.8), alone) == pytest.approx(0.8 / 1.02)
+    assert ground.power_ratio(wake(1.75, 0.8), alone) == pytest.approx(0.8 / 1.06)
 
 
 def test_inflow_over_the_disk_is_less_than_at_the_blades_and_has_converged_in_azimuth(coarse_hover):
@@ -193,6 +202,13 @@ def test_time_to_63_percent_is_found_between_samples():
     assert step.first_time(psi, 1 - np.exp(-psi / 1.5)) == pytest.approx(1.5 / (2 * np.pi), rel=1e-3)
     assert np.isnan(step.first_time(psi, np.zeros(61)))
     assert np.isnan(step.first_time(psi, np.full(61, np.nan)))
+
+
+def test_more_turns_and_slopes_take_longer():
+    level, slope = point("uh60", 18.0, 1.0), Point("uh60", 18.0, 1.0, slope_deg=20.0)
+    assert level.length == 1 < slope.length
+    assert point("uh60", 18.0, 1.0, free_turns=8.0).length == 4
+    assert point("uh60", 18.0, 1.0, **MARCHED).length < 1
 
 
 def test_wakes_start_from_their_neighbours():
