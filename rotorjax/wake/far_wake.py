@@ -108,6 +108,7 @@ def _over_plane(
     # what ln sinh x falls by in a turn is the same for every turn
     mean, mean_before = jnp.mean(x, axis=1), jnp.mean(_heights(before, normal, plane), axis=1) / REACH
     fall = after * (STEADY * jax.nn.softplus((_log_sinh(mean_before) - _log_sinh(mean)) / STEADY))[:, None, None]
+    fall = jnp.minimum(fall, np.log(FARTHEST[fall.dtype.itemsize]))
     free = (2 * REACH / jnp.sqrt(jnp.mean(jnp.sum(flat**2, axis=-1), axis=1)))[:, None, None]
     fall = _at_the_jets_speed(mean[:, None, None], free, fall)
     lower, thinned = _lowered(x[:, None], fall), _thinned(x[:, None], fall)
@@ -128,7 +129,7 @@ def _at_the_jets_speed(
     in which it would grow to W by the first it grows by the second to V with f ln V + V = 1 + (1 + f) ln W. What is
     used is that within some per cent, V = 1 + (1 + f) ln((f + W)/(f + 1)): like W at first, a step a turn in the end.
     """
-    thinned = _thinned(x, jnp.minimum(fall, np.log(FARTHEST[fall.dtype.itemsize])))
+    thinned = _thinned(x, fall)
     wide = 1 + (1 + free) * jnp.log((free + jnp.sqrt(thinned)) / (free + 1))
     return fall - jnp.log(thinned * (free + wide) / (wide**2 * (1 + free)))
 

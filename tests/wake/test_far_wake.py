@@ -186,6 +186,16 @@ def test_far_out_on_a_plane_turns_grow_by_one_step():
     np.testing.assert_allclose(np.diff(radius)[-5:], 2 * REACH * own * fall, rtol=0.01)
 
 
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_turns_that_a_search_drops_onto_the_plane_at_once_stay_finite(dtype):
+    """From 3 R above the plane down to it within a turn, 13 of ln sinh, and that 64 times."""
+    model = model_of(3.0, free_turns=2.0, closure_turns=2, closure_bundles=6)
+    turn = model.settings.steps_per_turn
+    nodes = helices(model).at[:, -turn - 1 :, 2].set(-2.9999).at[:, : -turn - 1, 2].set(0.0)
+    narrow = jax.tree.map(lambda a: a.astype(dtype) if eqx.is_inexact_array(a) else a, model)
+    assert np.all(np.isfinite(closure(narrow, nodes.astype(dtype), ZERO.astype(dtype))))
+
+
 def test_next_to_a_plane_a_narrow_turn_comes_down_by_the_same_ratio():
     """A stagnation flow: heights fall by one ratio, radii grow by the root of its inverse."""
     model = model_of(0.56, free_turns=2.0, closure_turns=3, closure_bundles=0)
