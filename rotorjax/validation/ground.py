@@ -2,7 +2,7 @@
 
 What tests near the ground measure is thrust and torque: their ratio v_IGE/v_OGE is that of induced power at the same
 thrust, ∫ λ dC_T over C_T^1.5. The mean inflow at the blades over √C_T, which leaves the loading out, stands beside it.
-A rotor at one collective lifts up to a third more near the ground, and there its induced power factor out of ground
+A rotor at one collective lifts up to 36 % more near the ground, and there its induced power factor out of ground
 effect is up to 4 % larger: so either is compared with its value out of ground effect at the thrust near the ground,
 which is read off two collectives.
 """

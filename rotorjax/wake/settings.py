@@ -310,9 +310,10 @@ MARCHED = {"free_turns": 2.0, "stretch": 1, "mixing": 0.0, "spreading": 0.0}
 def hover_settings(**overrides) -> WakeSettings:
     """Settings for the periodic wake in hover, over ground and slopes: four free turns, the old ones in long steps.
 
-    Eight turns change C_T and mean inflow of the UH-60 by up to 0.3 %; the first harmonics that a slope makes, 1 % of
-    mean inflow, are nearly converged over 20° and more (docs/free_wake.md). A march and its linear wake keep the two
-    turns of `wake_settings()`: fewer states, and no more turns than it can be trusted for.
+    Eight turns change C_T of the UH-60 by 0.2 % at most over level ground, mean inflow by 0.4 %; first harmonics that a
+    slope makes, 1 % of mean inflow, are not converged: they change by 12 % of themselves over 20° and 30°, by 43 % over
+    10° (docs/free_wake.md). A march and its linear wake keep the two turns of `wake_settings()`: fewer states, and no
+    more turns than it can be trusted for.
     """
     usual: dict[str, Any] = {"free_turns": 4.0, "stretch": 2, "mixing": 0.4, "spreading": 0.012}
     return wake_settings(**usual | overrides)

@@ -238,13 +238,17 @@ def test_over_a_slope_turns_come_down_along_the_shaft_and_run_off_downhill():
         return [spread * y[0] - np.tan(np.deg2rad(slope)), spread * y[1], -np.tanh(y[2])]
 
     found = closure(model, nodes, ZERO)[0].reshape(3, turn, 3)
+    free = 2 / np.sqrt(np.mean(np.sum(on_plane(nodes[0, -turn - 1 :])[:2] ** 2, axis=0)))
     for k in (1, 3):
-        for i in (1, 7, 20):
-            start, end = on_plane(nodes[0, -turn - 1 + i]), on_plane(found[k - 1, i - 1])
-            time = np.log(np.sinh(start[2]) / np.sinh(end[2]))
-            there = solve_ivp(flow, (0, time), start, rtol=1e-10, atol=1e-12).y[:, -1]
-            np.testing.assert_allclose(end[2], there[2], rtol=1e-7)
-            np.testing.assert_allclose(end[0] / end[1], there[0] / there[1], rtol=1e-3)
+        starts, ends = on_plane(nodes[0, -turn:]), on_plane(found[k - 1])
+        times, wider = np.log(np.sinh(starts[2]) / np.sinh(ends[2])), ends[1] / starts[1]
+        np.testing.assert_allclose(times, times[0], rtol=1e-10)
+        off_axis = np.abs(starts[1]) > 0.1
+        thinner = wider**2 * (1 + free) / (free + wider) * np.tanh(ends[2])
+        np.testing.assert_allclose(thinner[off_axis], np.tanh(starts[2])[off_axis], rtol=1e-10)
+        for i in (0, 6, 19):
+            there = solve_ivp(flow, (0, times[i]), starts[:, i], rtol=1e-10, atol=1e-12).y[:, -1]
+            np.testing.assert_allclose(ends[0, i] / wider[i], there[0] * starts[1, i] / there[1], atol=1e-3)
 
 
 def test_far_above_a_slope_the_closure_is_that_of_free_air():
