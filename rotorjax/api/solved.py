@@ -56,7 +56,10 @@ class Solved(eqx.Module):
     CP = property(lambda self: self.found.CP, doc="Power coefficient.")
     CP_induced = property(lambda self: self.found.CP_induced, doc="Its induced part.")
     CP_profile = property(lambda self: self.found.CP_profile, doc="Its profile part.")
-    mean_inflow = property(lambda self: self.found.mean_inflow, doc="Area-weighted mean inflow over ΩR, ().")
+    mean_inflow = property(
+        lambda self: self.found.mean_inflow,
+        doc="Area-weighted mean inflow over ΩR, (); a free wake's over what the blades sweep.",
+    )
     inflow = property(lambda self: self.found.inflow, doc="Inflow over ΩR, (K, R).")
     dct_dr = property(lambda self: self.found.dct_dr, doc="Loading dC_T/d(r/R), (K, R).")
     r = property(lambda self: self.found.r, doc="Radii over R, (R,).")
@@ -143,7 +146,7 @@ NUMBERS = {
     "CP": "power coefficient P/(ρA(ΩR)³)",
     "CP_induced": "induced part of the power coefficient",
     "CP_profile": "profile part of the power coefficient",
-    "mean_inflow": "area-weighted mean inflow over ΩR, positive down",
+    "mean_inflow": "area-weighted mean inflow over ΩR, positive down; a free wake's over what the blades sweep",
 }
 NAMES = {FreeWake: "free wake", FiniteStateRotor: "finite state"}
 

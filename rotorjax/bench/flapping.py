@@ -13,7 +13,10 @@ from rotorjax.wake.solution import Solution
 RIGID = {
     "rigid_CT": ("CT", "rigid blades: thrust coefficient T/(ρA(ΩR)²)"),
     "rigid_CP_induced": ("CP_induced", "rigid blades: induced part of the power coefficient"),
-    "rigid_mean_inflow": ("mean_inflow", "rigid blades: area-weighted mean induced inflow over ΩR"),
+    "rigid_mean_inflow": (
+        "mean_inflow",
+        "rigid blades: mean induced inflow over ΩR, by area over what the blades sweep",
+    ),
 }
 
 

@@ -33,7 +33,10 @@ NUMBERS: dict[str, tuple[str, str]] = {
     "CP": ("CP", "power coefficient P/(ρA(ΩR)³)"),
     "CP_induced": ("CP_induced", "induced part of the power coefficient"),
     "CP_profile": ("CP_profile", "profile part of the power coefficient"),
-    "free_wake_mean_inflow": ("mean_inflow", "free wake: area-weighted mean induced inflow over ΩR"),
+    "free_wake_mean_inflow": (
+        "mean_inflow",
+        "free wake: mean induced inflow over ΩR, by area over what the blades sweep",
+    ),
     "free_wake_residual": ("residual", "free wake: rms node displacement over one revolution, over R"),
     "free_wake_load_change": ("load_change", "free wake: relative change of C_T over one more revolution"),
     "free_wake_ground_normal_velocity_rms": (

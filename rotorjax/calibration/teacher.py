@@ -19,7 +19,7 @@ from jaxtyping import Array, Float
 
 from rotorjax.bench.cases import SLOPE_HEIGHT, Case
 from rotorjax.bench.dataset import present, select
-from rotorjax.bench.record import COMPARED
+from rotorjax.bench.record import annulus_shares
 from rotorjax.calibration.parameters import ParameterSet
 from rotorjax.calibration.taught import PARAMETERS, taught_model, taught_state
 from rotorjax.errors import InputError
@@ -99,7 +99,6 @@ def lessons(merged: xr.Dataset, parameters: Sequence[str] = PARAMETERS.names) ->
     rows = merged.sel(case=[c.name for c in cases])
     r, widths = rows["radius"].to_numpy(), rows["panel_width"].to_numpy()[0]
     psi = rows["station_azimuth"].to_numpy()
-    inside = np.where((r >= COMPARED[0]) & (r <= COMPARED[1]), r * widths, 0.0)
     data = Lessons(
         names=tuple(c.name for c in cases),
         model=_model(merged),
@@ -113,7 +112,7 @@ def lessons(merged: xr.Dataset, parameters: Sequence[str] = PARAMETERS.names) ->
         reference=jnp.asarray(reference),
         r=jnp.asarray(r),
         psi=jnp.asarray(psi),
-        weights=jnp.asarray(inside / inside.sum() / psi.size),
+        weights=jnp.asarray(annulus_shares(widths) / psi.size),
     )
     return data, chosen
 

@@ -42,7 +42,8 @@ Flow = Callable[[Float[Array, "P 3"]], Float[Array, "P 3"]]
 class Arranged:
     """An arrangement solved. wake: the free wake. states (N, M) of system: the finite states under its loads. inflow:
     maps (N, K, R) of each model over ΩR, positive down, at azimuths psi (rad, each rotor's own sense) and radii r/R.
-    mean: area-weighted over each whole disk, (N,). seconds: of the wake.
+    mean: area-weighted, (N,), the finite states' over each whole disk, the wake's over what its blades sweep. seconds:
+    of the wake.
     """
 
     case: Arrangement

@@ -5,6 +5,7 @@ import numpy as np
 from rotorjax.bench.cases import Case
 from rotorjax.bench.dataset import present
 from rotorjax.bench.markdown import table
+from rotorjax.bench.record import annulus_shares
 from rotorjax.study.reading import Reading, listed
 
 ZONES = {"root (0.25–0.5)": (0.25, 0.5), "middle (0.5–0.8)": (0.5, 0.8), "tip (0.8–0.95)": (0.8, 0.95)}
@@ -32,10 +33,9 @@ def contraction(reading: Reading, case: Case, depth: float = 0.3) -> float:
 def shape_rms(reading: Reading, case: Case, model: str) -> float:
     """Rms difference once the model's inflow is scaled to the free wake's mean over the annulus compared."""
     ours, theirs = reading.inflow(case, model), reading.inflow(case, "free_wake")
-    inside = (reading.r >= 0.25) & (reading.r <= 0.95)
-    weights = np.where(inside, reading.r * reading.widths, 0.0)
-    scaled = ours * float(np.mean(theirs @ weights) / np.mean(ours @ weights))
-    return float(np.sqrt(np.mean((scaled - theirs) ** 2 @ weights) / weights.sum()))
+    shares = annulus_shares(reading.widths)
+    scaled = ours * float(np.mean(theirs @ shares) / np.mean(ours @ shares))
+    return float(np.sqrt(np.mean((scaled - theirs) ** 2 @ shares)))
 
 
 def _row(reading: Reading, case: Case) -> list[object]:

@@ -8,7 +8,7 @@ import xarray as xr
 
 from rotorjax.bench.cases import SLOPE_HEIGHT, Case
 from rotorjax.bench.dataset import present, select
-from rotorjax.bench.record import COMPARED, rms_difference
+from rotorjax.bench.record import annulus_shares, rms_difference
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,13 @@ class Reading:
         return self.field(case, f"{model}_inflow") / self.reference
 
     def mean(self, case: Case, model: str) -> float:
-        """Normalised area-weighted mean inflow."""
-        return self.number(case, f"{model}_mean_inflow") / self.reference
+        """Normalised mean inflow by area over what the blades sweep, where all models are asked."""
+        return float(np.mean(self.inflow(case, model) @ annulus_shares(self.widths, (0.0, 1.0))))
 
     def side(self, case: Case, model: str, *, mountain: bool) -> float:
         """Normalised area-weighted mean inflow over one half of the annulus that is compared."""
-        inside = (self.r >= COMPARED[0]) & (self.r <= COMPARED[1])
         half = (np.cos(self.psi) * (1 if mountain else -1)) > 1e-9
-        weights = np.where(inside, self.r * self.widths, 0.0)
-        return float(np.mean(self.inflow(case, model)[half] @ weights) / weights.sum())
+        return float(np.mean(self.inflow(case, model)[half] @ annulus_shares(self.widths)))
 
     def tilt(self, case: Case, model: str) -> float:
         """Valley side less mountain side."""
@@ -92,19 +90,17 @@ class Reading:
         """Rms difference of a model and the free wake over one half."""
         half = (np.cos(self.psi) * (1 if mountain else -1)) > 1e-9
         ours, theirs = self.inflow(case, model)[half], self.inflow(case, "free_wake")[half]
-        return rms_difference(ours, theirs, self.r, self.widths)
+        return rms_difference(ours, theirs, self.widths)
 
     def zone_rms(self, case: Case, model: str, between: tuple[float, float]) -> float:
         """Rms difference of a model and the free wake over an annulus."""
         pair = self.inflow(case, model), self.inflow(case, "free_wake")
-        return rms_difference(*pair, self.r, self.widths, between)
+        return rms_difference(*pair, self.widths, between)
 
     def zone_bias(self, case: Case, model: str, between: tuple[float, float]) -> float:
         """Area-weighted mean over an annulus of the free wake's inflow less a model's."""
-        inside = (self.r >= between[0]) & (self.r <= between[1])
-        weights = np.where(inside, self.r * self.widths, 0.0)
         gap = self.inflow(case, "free_wake") - self.inflow(case, model)
-        return float(np.mean(gap @ weights) / weights.sum())
+        return float(np.mean(gap @ annulus_shares(self.widths, between)))
 
     def peak(self, case: Case, between: tuple[float, float], *, lowest: bool = False) -> tuple[float, float, float]:
         """Value, radius and azimuth (degrees) of the free wake's largest (or smallest) loading in an annulus."""

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from rotorjax.bench.record import annulus_shares
 from rotorjax.frames import disk_points
 from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
@@ -43,16 +44,16 @@ def disk_inflow(solution: Solution, azimuths: int = 48) -> float:
     """Mean inflow over ΩR of an axisymmetric wake in hover, over the area and over all azimuths between two blades.
 
     `Solution.mean_inflow` is the mean at the blades, where the inflow is larger than between them. azimuths: in a
-    blade's passage, equally spaced and none on a blade. The root cut-out counts with the innermost value.
+    blade's passage, equally spaced and none on a blade. The root cut-out counts with the flow through it.
     """
     model, count = solution.model, azimuths
     psi = 2 * np.pi / model.rotor.blades * (np.arange(count) + 0.5) / count
-    r, edges = np.asarray(model.stations), np.asarray(model.edges)
+    edges = np.asarray(model.edges)
+    within = edges[0] * np.sqrt(np.arange(9) / 8)  # rings of equal area
+    r = np.concatenate([np.sqrt((within[1:] ** 2 + within[:-1] ** 2) / 2), np.asarray(model.stations)])
     points = disk_points(jnp.asarray(np.tile(r, count)), jnp.asarray(np.repeat(psi, r.size)))
     inflow = -np.asarray(_velocity(solution.state, points, model))[0, :, 2].reshape(count, r.size)
-    area = np.diff(edges**2)
-    area[0] += edges[0] ** 2
-    return float(inflow.mean(axis=0) @ area)
+    return float(inflow.mean(axis=0) @ np.diff(np.concatenate([within[:-1], edges]) ** 2))
 
 
 def first_harmonic(
@@ -62,9 +63,8 @@ def first_harmonic(
 
     Twice the mean of values · exp(iψ): the real part goes with cos ψ, the imaginary one with sin ψ.
     """
-    weights = np.where((solution.r > inner) & (solution.r < outer), solution.r * solution.widths, 0.0)
     over_azimuth = 2 * np.mean(values * np.exp(1j * solution.psi)[:, None], axis=0)
-    return complex(over_azimuth @ weights / weights.sum())
+    return complex(over_azimuth @ annulus_shares(solution.widths, (inner, outer)))
 
 
 _velocity = eqx.filter_jit(velocity)

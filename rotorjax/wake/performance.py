@@ -11,7 +11,7 @@ from rotorjax.wake.model import FreeWake
 
 
 class Coefficients(NamedTuple):
-    """thrust: C_T = T/(ρA(ΩR)²); power: C_P = P/(ρA(ΩR)³) = induced + profile; mean_inflow: over ΩR, area-weighted."""
+    """thrust: C_T = T/(ρA(ΩR)²); power: C_P = P/(ρA(ΩR)³) = induced + profile; mean_inflow: over ΩR (`disk_mean`)."""
 
     thrust: Float[Array, ""]
     power: Float[Array, ""]
@@ -32,7 +32,11 @@ def performance_in(model: FreeWake, control: Float[Array, "K R 3"], loads: Secti
 
 
 def disk_mean(model: FreeWake, inflow: Float[Array, "K R"]) -> Float[Array, ""]:
-    """Area-weighted mean of an inflow at the control points; the cut-out counts with the innermost value."""
+    """Mean of an inflow at the control points over the area that the blades sweep.
+
+    The cut-out does not count: the innermost point lies beside the root's trailing vortex, the closer the narrower its
+    panel, and its upwash is no measure of what goes through the hub (UH-60, h = 1: −0.005 to 0.059 ΩR down from 14
+    panels to 40; the mean with it fell by 3.8 %, without it by 0.6 %).
+    """
     edges = model.edges
-    area = jnp.diff(edges**2).at[0].add(edges[0] ** 2)
-    return jnp.mean(inflow, axis=0) @ area
+    return jnp.mean(inflow, axis=0) @ jnp.diff(edges**2) / (edges[-1] ** 2 - edges[0] ** 2)

@@ -40,7 +40,7 @@ class Solution:
 
     r, widths (R,): control points and panel widths. psi (K,); K = 1 where the wake is axisymmetric. dct_dr, inflow
     (positive down, climb included), circulation (over ΩR²): (K, R). CT, CP: T/(ρA(ΩR)²) and P/(ρA(ΩR)³) with CP =
-    CP_induced + CP_profile. mean_inflow: area-weighted over the disk, the cut-out counted with the innermost value.
+    CP_induced + CP_profile. mean_inflow: area-weighted over what the blades sweep.
     tip_vortex (K, A, 3): free nodes in the hub frame at ages tip_vortex_age (A,), the release point first.
     """
 
