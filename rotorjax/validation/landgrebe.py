@@ -84,6 +84,6 @@ def _fit(at: Point, wakes: Wakes, age: np.ndarray) -> Path:
 
 KNOWN = (
     "Beyond the first blade passage all tip vortices descend by about a fifth less than the fit has it. So does the "
-    "one rotor measured here, by 14 % (Caradonna and Tung's), and from that measurement ours differs by 5 %."
+    "one rotor measured here, by 14 % (Caradonna and Tung's), and from that measurement ours differs by 2 %."
 )
 CASE = ValidationCase(NAME, "Landgrebe's tip vortex", points, compare, KNOWN)

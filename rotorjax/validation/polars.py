@@ -98,13 +98,15 @@ def draw(wakes: Wakes) -> Figure:
 
 
 KNOWN = (
-    "Thrust at a given pitch is 8 to 16 % low: the rotors lift what ours do with 0.2 to 1.0° less pitch. At the same "
-    "thrust two blades need the measured torque to 1.2 % and have its figure of merit to 0.006, so inflow and drag "
-    "are right there and the pitch that they go with is not. Blade elements with the reported lift slope, uniform "
-    "inflow and no tip loss give C_T = 0.0032 and 0.0052 at 8°: the measurement has 1.01 and 0.95 of it, ours 0.86 "
-    "and 0.86, and of Caradonna and Tung's rotor, whose short blades chose the settings, 0.71 was measured. Four "
-    "blades need 7 to 17 % more torque than ours, 2.9e-5 to 3.9e-5; 1.4e-5 of it is there at zero pitch without lift, "
-    "where the four blades' torque is 1.34e-4 and the section's drag gives 1.20e-4. The two blades' is 5.4e-5, which "
-    "is 20 % less a blade."
+    "Thrust at a given pitch is 7 to 15 % low: the rotors lift what ours do with 0.2 to 1.0° less pitch. At the same "
+    "thrust two blades need the measured torque to 2.6 % and have its figure of merit to 0.011, so inflow and drag "
+    "are right there and the pitch that they go with is not. What is missing is one number for both rotors, 0.50° of "
+    "pitch for each 0.001 of C_T a blade, within 0.10° rms: blades that twist nose up by their lift would have that, "
+    "or a section with a slope of 6.8 a radian where 5.75 was measured; neither is known of them. Blade elements with "
+    "the reported lift slope, uniform inflow and no tip loss give C_T = 0.0032 and 0.0052 at 8°: the measurement has "
+    "1.01 and 0.95 of it, ours 0.87 and 0.86, and of Caradonna and Tung's rotor, whose short blades chose the "
+    "settings, 0.71 was measured. Four blades need 8 to 18 % more torque than ours, 3.0e-5 to 4.5e-5; 1.4e-5 of it is "
+    "there at zero pitch without lift, where the four blades' torque is 1.34e-4 and the section's drag gives 1.20e-4. "
+    "The two blades' is 5.4e-5, which is 20 % less a blade."
 )
 CASE = ValidationCase(NAME, "Knight and Hefner's rotors over pitch", points, compare, KNOWN)

@@ -55,7 +55,7 @@ def test_the_place_has_derivatives_by_station_and_band(uh60):
         moved = eqx.tree_at(lambda m: (m.settings.release, m.settings.release_band), model, tuple(numbers))
         return tip_point(moved, rolled(moved))
 
-    at, step = jnp.array([0.971, 0.015]), 1e-7
+    at, step = jnp.array([0.968, 0.015]), 1e-7
     forward, reverse = jax.jacfwd(place)(at), jax.jacrev(place)(at)
     differences = [(place(at + e) - place(at - e)) / (2 * step) for e in step * jnp.eye(2)]
     np.testing.assert_allclose(forward, reverse, rtol=1e-12, atol=1e-14)
@@ -108,10 +108,11 @@ def test_derivatives_are_right_in_both_modes(uh60, rule):
         np.testing.assert_allclose(forward[:, i], (f(gamma + e) - f(gamma - e)) / (2 * step), rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize("gamma", [jnp.zeros(14), -jnp.ones(14) * 0.01])
-def test_unloaded_and_downward_blades_stay_finite(uh60, gamma):
+@pytest.mark.parametrize("strength", [0.0, -0.01])
+def test_unloaded_and_downward_blades_stay_finite(uh60, strength):
     model = model_of(uh60, "centroid", (0.45,))
-    found, slope = jax.jvp(lambda g: release(model, model.leading, g), (gamma,), (jnp.ones(14),))
+    one = jnp.ones_like(model.stations)
+    found, slope = jax.jvp(lambda g: release(model, model.leading, g), (strength * one,), (one,))
     assert all(bool(jnp.all(jnp.isfinite(v))) for v in (*found, *slope))
 
 

@@ -62,7 +62,7 @@ def test_derivatives_through_the_wake(grounded):
     for name, where in PARAMETERS.items():
         along = jax.tree.map(jnp.subtract, numbers(moved(model, where, 1.0)), numbers(model))
         forward = slope(model, along)
-        ends = [solve(moved(model, where, s), start=grounded, tol=1e-11) for s in (step, -step)]
+        ends = [solve(moved(model, where, s), start=grounded, tol=1e-12) for s in (step, -step)]
         assert all(end.converged for end in ends)
         difference = (np.array([ends[0].CT, ends[0].mean_inflow]) - [ends[1].CT, ends[1].mean_inflow]) / (2 * step)
         np.testing.assert_allclose(forward, difference, rtol=1e-5, err_msg=name)
