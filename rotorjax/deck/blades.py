@@ -16,7 +16,7 @@ from rotorjax.inflow.balance import Stations
 from rotorjax.operating import OperatingPoint
 from rotorjax.potential.loading import from_distribution
 from rotorjax.potential.modes import ModeTable
-from rotorjax.rotor.blade_element import disk_loading, section_loads
+from rotorjax.rotor.blade_element import disk_loading, lifting_share, section_loads
 from rotorjax.rotor.geometry import Rotor
 
 
@@ -90,4 +90,4 @@ class SectionBlades(Blades):
         """Return dC_T/dr̄ at stations where u_P is `down` over ΩR; pitch (rad): without twist, () or (K, 1)."""
         u = at.r + mu * jnp.sin(at.psi)[:, None]
         loads = section_loads(self.rotor, self.operating, at.r, jnp.broadcast_to(u, down.shape), down, pitch)
-        return disk_loading(self.rotor, loads)
+        return disk_loading(self.rotor, loads) * lifting_share(self.rotor, at.widths)

@@ -1,6 +1,7 @@
 """Blade loads and the steady finite-state inflow that make each other: the pressure terms that reproduce themselves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,7 +24,7 @@ from rotorjax.potential.model import (
     unit_inflow,
     unit_states,
 )
-from rotorjax.rotor.blade_element import SectionLoads, disk_loading, rotor_coefficients, section_loads
+from rotorjax.rotor.blade_element import SectionLoads, disk_loading, lifting_share, rotor_coefficients, section_loads
 from rotorjax.rotor.geometry import Rotor
 
 AZIMUTHS, PANELS = 24, 48
@@ -120,7 +121,7 @@ def balance(
     """Find the loading that reproduces itself, by Newton's method; differentiable by the implicit function theorem.
 
     thrust: C_T that the search starts from, negative for a rotor that is turned by the wind or thrusts down. flow: of
-    unit states at the stations, where it is at hand. No tip loss beyond what the expansion has. Raises InputError where
+    unit states at the stations, where it is at hand. Lift ends at the rotor's `tip_loss`. Raises InputError where
     none is found, under jit an error at run time.
     """
     flow = flow_of(model, stations) if flow is None else flow
@@ -214,8 +215,9 @@ def self_consistent(
 
 
 def blade_loads(down: Float[Array, "K R"], rotor: Rotor, operating: OperatingPoint, stations: Stations) -> SectionLoads:
-    """Section loads of an inflow over ΩR, positive down, climb included."""
-    return section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
+    """Section loads of an inflow over ΩR, positive down, climb included; no lift beyond the rotor's `tip_loss`."""
+    loads = section_loads(rotor, operating, stations.r, jnp.broadcast_to(stations.r, down.shape), down)
+    return replace(loads, dlift=loads.dlift * lifting_share(rotor, stations.widths))
 
 
 def tolerance(dtype: Any) -> float:

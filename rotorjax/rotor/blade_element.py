@@ -162,6 +162,15 @@ def _limited(difference: Float[Array, "*n"]) -> Float[Array, "*n"]:
     return jnp.clip(difference, -0.2, 0.2) + jnp.sign(difference) * 0.1 * jnp.tanh(above / 0.1)
 
 
+def lifting_share(rotor: Rotor, widths: Float[Array, " R"]) -> Float[Array, " R"]:
+    """Share of each panel that lies inboard of the rotor's tip loss, (R,); widths: over R, of panels up to the tip.
+
+    Beyond `tip_loss` blade elements have no lift, only drag: what an inflow of infinitely many blades leaves out.
+    """
+    inner = 1 - jnp.cumsum(widths[::-1])[::-1]
+    return jnp.clip((rotor.tip_loss - inner) / widths, 0.0, 1.0)
+
+
 def disk_loading(rotor: Rotor, loads: SectionLoads) -> Float[Array, "*n"]:
     """dC_T/dr̄ of Eq. 17, (1/π) Σ_q L_q/(ρΩ²R³), where every blade carries `loads`: the distribution over (r, ψ).
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.operating import OperatingPoint
-from rotorjax.rotor.blade_element import SectionLoads, section_loads
+from rotorjax.rotor.blade_element import SectionLoads, lifting_share, section_loads
 from rotorjax.rotor.flap_lag import Blade, Motion, hinge_velocity
 from rotorjax.rotor.geometry import Rotor
 from rotorjax.rotor.hub import TurningFrame
@@ -50,8 +50,7 @@ def blade_sections(rotor: Rotor, panels: int = 24) -> Sections:
     share = jnp.asarray(np.linspace(0.0, 1.0, panels + 1))
     edges = rotor.root_cutout + (1 - rotor.root_cutout) * share
     widths = jnp.diff(edges)
-    lifting = jnp.clip((rotor.tip_loss - edges[:-1]) / widths, 0.0, 1.0)
-    return Sections(0.5 * (edges[1:] + edges[:-1]), widths, lifting)
+    return Sections(0.5 * (edges[1:] + edges[:-1]), widths, lifting_share(rotor, widths))
 
 
 def places(blade: Blade, motion: Motion, r: Float[Array, " R"]) -> Float[Array, "R 3"]:

@@ -10,11 +10,13 @@ which is read off two collectives.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from rotorjax.bench.plotting import FREE_WAKE, INK, VPBFSM, new_figure, series_colours, style
+from rotorjax.inflow.balance import Balance
 from rotorjax.reference import published as reference
 from rotorjax.rotor import catalogue
 from rotorjax.validation.case import Comparison, Subject, ValidationCase, Wakes
@@ -90,17 +92,19 @@ def _rows_of(free: Point, grounded: tuple[Point, ...], wakes: Wakes) -> list[Row
     return found + [_spread(at, wakes[at], where) for at in reversed(grounded) if _height(at) <= NEAR]
 
 
-def power_ratio(near: Solution, alone: Sequence[Solution]) -> float:
+def power_ratio(near: Solution | Balance, alone: Sequence[Solution | Balance]) -> float:
     """Induced power near the ground over that far from it at the same thrust."""
     return _ratio(lambda wake: wake.CP_induced / wake.CT**1.5, near, alone)
 
 
-def inflow_ratio(near: Solution, alone: Sequence[Solution]) -> float:
+def inflow_ratio(near: Solution | Balance, alone: Sequence[Solution | Balance]) -> float:
     """Mean inflow near the ground over that far from it at the same thrust."""
     return _ratio(lambda wake: wake.mean_inflow / np.sqrt(wake.CT), near, alone)
 
 
-def _ratio(of: Callable[[Solution], float], near: Solution, alone: Sequence[Solution]) -> float:
+def _ratio(
+    of: Callable[[Solution | Balance], Any], near: Solution | Balance, alone: Sequence[Solution | Balance]
+) -> float:
     """What changes little with thrust, near the ground over far from it, where it is linear between two wakes."""
     one, other = alone
     return float(of(near) / (of(one) + (of(other) - of(one)) * (near.CT - one.CT) / (other.CT - one.CT)))
