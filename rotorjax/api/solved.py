@@ -222,7 +222,7 @@ def performance(solved: Solved) -> Performance:
 
     >>> import rotorjax as rj
     >>> f"{rj.performance(rj.solve(rj.finite_state(*rj.rotor('uh60', 18.0)))).thrust / 1e3:.0f} kN"
-    '86 kN'
+    '77 kN'
     """
     rotor, operating = solved.model.rotor, solved.model.operating
     tip = operating.tip_speed(rotor.radius)
