@@ -312,8 +312,8 @@ def hover_settings(**overrides) -> WakeSettings:
     """Settings for the periodic wake in hover, over ground and slopes: four free turns, the old ones in long steps.
 
     Eight turns change C_T of the UH-60 by 0.3 % at most over level ground, mean inflow by 0.4 %; first harmonics that a
-    slope makes, 1 % of mean inflow, are not converged: they change by 8 % of themselves over 20°, 16 % over 30° and 36
-    % over 10° (docs/free_wake.md). A march and its linear wake keep the two turns of `wake_settings()`: fewer states,
+    slope makes, 1 % of mean inflow, are not converged: over 10°, 20° and 30° they change by 36, 8 and 16 % of
+    themselves (docs/free_wake.md). A march and its linear wake keep the two turns of `wake_settings()`: fewer states,
     and no more turns than it can be trusted for.
     """
     usual: dict[str, Any] = {"free_turns": 4.0, "stretch": 2, "mixing": 0.4, "spreading": 0.012}
