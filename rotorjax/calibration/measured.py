@@ -20,8 +20,7 @@ from rotorjax.reference import published as reference
 from rotorjax.wake.equilibrium import Unknowns, evaluate, residual
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.performance import performance
-from rotorjax.wake.roll_up import tip_point
-from rotorjax.wake.segments import lattice_nodes
+from rotorjax.wake.segments import tip_vortex
 from rotorjax.wake.settings import wake_settings
 
 ROTOR, COLLECTIVE_DEG = "caradonna_tung", 8.0
@@ -86,10 +85,7 @@ def outputs(model: FreeWake, x: Unknowns) -> Float[Array, " N"]:
     """What the free wake makes of each number of `measurements`."""
     found = evaluate(model, x)
     lift = jnp.interp(jnp.asarray(reference.caradonna_tung().r), model.stations, found.loads.cl[0])
-    lattice = lattice_nodes(model, x.near[0])
-    inside = jax.vmap(lambda row: tip_point(model, row), in_axes=1)(lattice)
-    path = jnp.concatenate([inside, x.far[0, 0]])
-    ages = jnp.asarray(model.settings.node_ages)
+    path, ages = tip_vortex(model, x.near[0], x.far[0]), jnp.asarray(model.settings.tip_ages)
     r, z = (jnp.interp(jnp.deg2rad(jnp.asarray(AGES_DEG)), ages, v) for v in (_radius(path), path[:, 2]))
     return jnp.concatenate([performance(model, found).thrust[None], lift, r, z])
 

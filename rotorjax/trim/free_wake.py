@@ -178,11 +178,12 @@ def first_guess(p: WakeTrim, controls: Float[Array, "3"], coning: float, slices:
 def carried(wake: Unknowns, model: FreeWake, wind: Float[Array, "3"]) -> Unknowns:
     """A wake that a wind (hub frame, over ΩR) carries since its release, K slices in their blades' frames."""
     slices = wake.near.shape[0]
-    ages, near = model.settings.node_ages[1:], model.settings.near_ages
+    settings = model.settings
     psi = 2 * np.pi / slices * np.arange(slices)
     turned = rotate_about_shaft(jnp.broadcast_to(wind, (slices, 3)), -jnp.asarray(psi))
 
     def carry(nodes, age):
         return nodes + age[:, None] * turned[:, None, None, :]
 
-    return wake._replace(near=carry(wake.near, ages[:near]), far=carry(wake.far, ages[near:]))
+    near, far = carry(wake.near, settings.lattice_ages[1:]), carry(wake.far, settings.filament_ages[1:])
+    return wake._replace(near=near, far=far)

@@ -10,8 +10,7 @@ from rotorjax.frames import disk_points
 from rotorjax.reference.published import Path
 from rotorjax.wake.equilibrium import evaluated
 from rotorjax.wake.field import velocity
-from rotorjax.wake.roll_up import tip_point
-from rotorjax.wake.segments import lattice_nodes
+from rotorjax.wake.segments import tip_vortex
 from rotorjax.wake.solution import Solution
 
 
@@ -21,10 +20,8 @@ def tip_path(solution: Solution) -> Path:
     Within the near wake, where it is not rolled up yet, it is the lattice at the span station of its release.
     """
     settings, state = solution.model.settings, solution.state
-    lattice = np.asarray(lattice_nodes(solution.model, state.near[0]))
-    rows = [tip_point(solution.model, jnp.asarray(lattice[:, k])) for k in range(lattice.shape[1])]
-    nodes = np.concatenate([np.asarray(rows), np.asarray(state.far[0, 0])])
-    return Path(settings.node_ages, np.hypot(nodes[:, 0], nodes[:, 1]), nodes[:, 2])
+    nodes = np.asarray(tip_vortex(solution.model, jnp.asarray(state.near[0]), jnp.asarray(state.far[0])))
+    return Path(settings.tip_ages, np.hypot(nodes[:, 0], nodes[:, 1]), nodes[:, 2])
 
 
 def far_pitch(path: Path, blades: int) -> float:

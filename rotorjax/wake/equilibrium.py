@@ -49,7 +49,8 @@ def full_state(model: FreeWake, x: Unknowns) -> tuple[WakeState, Release]:
     """Periodic state with all strengths, and where the far filaments start."""
     near, far = operators(model)
     gamma_near = solve_scalar(near, jnp.zeros((*x.gamma_bound.shape, len(near.inlet))), x.gamma_bound)
-    start = jax.vmap(lambda row, gamma: release(model, row, gamma))(x.near[:, :, -1], gamma_near[:, :, -1])
+    row = model.settings.release_ages - 1
+    start = jax.vmap(lambda *at: release(model, *at))(x.near[:, :, row], gamma_near[:, :, row])
     gamma_far = solve_scalar(far, jnp.zeros((*start.strength.shape, len(far.inlet))), start.strength)
     return WakeState(x.near, x.far, gamma_near, gamma_far, x.gamma_bound), start
 

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane, component
 from rotorjax.wake.model import FreeWake
+from rotorjax.wake.roll_up import rolled_up
 from rotorjax.wake.vortex_core import core_radius
 
 STILL = 0.01
@@ -51,7 +52,7 @@ def repeats(model: FreeWake) -> Repeats:
     settings = model.settings
     ones = range(1, settings.closure_turns + 1)
     weights = [2**i for i in range(1, settings.closure_bundles + 1)]
-    free = settings.near_wake_deg / 360 + settings.free_turns
+    free = float(settings.filament_ages[-1]) / (2 * np.pi)
     ends = free + settings.closure_turns + np.cumsum([0, *weights])
     middles = (2 * np.array(weights) / (ends[:-1] ** -2.0 - ends[1:] ** -2.0)) ** (1 / 3)
     return Repeats((*map(float, ones), *(middles - free + 0.5)), (*(1 for _ in ones), *weights))
@@ -233,7 +234,8 @@ def turns_each(model: FreeWake) -> Float[np.ndarray, " S"]:
 
 
 def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray, " S"]) -> Float[Array, "F S"]:
-    """What far filaments of these strengths have left at these ages (rad, from the blade).
+    """What far filaments of these strengths carry at these ages (rad, from the blade): of what has not faded, the share
+    that has rolled up.
 
     Inboard filaments fade, and the impulse of a turn, Σ Γ r², changes as they do: but for the share `impulse_kept`, for
     which the tip vortex gives up (r_i/r_tip)² of what the filament released at r_i loses.
@@ -243,7 +245,7 @@ def faded(model: FreeWake, strength: Float[Array, "F S"], age: Float[np.ndarray,
     left = jnp.exp(-settings.inboard_decay * turns - (settings.mixing * _mixed(age)) ** 2)
     arms = (np.array(settings.inboard)[:, None] / settings.release) ** 2
     tip = strength[0] + settings.impulse_kept * jnp.sum(arms * (1 - left) * strength[1:], axis=0)
-    return jnp.concatenate([tip[None], left * strength[1:]])
+    return rolled_up(settings, age) * jnp.concatenate([tip[None], left * strength[1:]])
 
 
 def _mixed(age: Float[np.ndarray, " S"]) -> Float[Array, " S"]:

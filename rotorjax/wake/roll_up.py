@@ -1,6 +1,6 @@
 """Roll-up: how the near wake's trailers become a few far filaments.
 
-Trailer i of the last row carries γ_i = Γ_{i−1} − Γ_i. A smooth maximum of the bound circulation over the outer blade,
+Trailer i of a row carries γ_i = Γ_{i−1} − Γ_i. A smooth maximum of the bound circulation over the outer blade,
 
     Γ_tip = Σ_j p_j Γ_j,   p_j ∝ (Γ_j/max Γ)^n Δr_j   (r > 0.6 R),
 
@@ -18,8 +18,12 @@ at the ends, by weights linear in r², so that for any loading both
 
 hold. It is linear in Γ: as smooth as a rule can be.
 
-The tip vortex starts at the mean place of a short stretch of the last row, `release` ± `release_band`. A single point
-of that row will not do: its edge has begun to roll up, and the point moves on with every panel that resolves it.
+The tip vortex starts at the mean place of a short stretch of a row, `release` ± `release_band`. A single point of that
+row will not do: its edge has begun to roll up, and the point moves on with every panel that resolves it.
+
+The filaments start at the near wake's last row (`roll_up_start` 1), or before it: then they carry a share that rises
+linearly in age, from nothing to all at that row, and the trailers what is left. A sheet takes some chords to roll up,
+and where a lattice ends at once can be felt: under the next blade of four C_T rises by 2 to 3 % (docs/free_wake.md).
 """
 
 from functools import partial
@@ -31,6 +35,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.model import FreeWake
+from rotorjax.wake.settings import WakeSettings
 
 SAMPLES = 16
 """Stations over which the place of the tip vortex is averaged."""
@@ -61,21 +66,33 @@ def tip_share(model: FreeWake, gamma: Float[Array, " R"]) -> Float[Array, " R+1"
     return jnp.concatenate([jnp.zeros(1, weight.dtype), jnp.cumsum(weight)])
 
 
+def rolled_up(settings: WakeSettings, age: Float[np.ndarray, "*n"]) -> Float[Array, "*n"]:
+    """Share of the trailers' circulation, 0 to 1, that the far filaments carry at these ages (rad).
+
+    >>> settings = WakeSettings(near_wake_deg=120.0, roll_up_start=0.5)
+    >>> rolled_up(settings, np.deg2rad([45.0, 90.0, 150.0])).round(3).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    first, last = settings.lattice_ages[[settings.release_ages, -1]]
+    # where both are one age all is rolled up from there on
+    return jnp.clip((age - first) / max(last - first, 1e-6), 0, 1)
+
+
 @partial(jax.jit, inline=True)
-def release(model: FreeWake, last_row: Float[Array, "R+1 3"], gamma: Float[Array, " R"]) -> Release:
-    """Start points and strengths of the far filaments from the last row of the near wake and its ring strengths."""
+def release(model: FreeWake, row: Float[Array, "R+1 3"], gamma: Float[Array, " R"]) -> Release:
+    """Start points and strengths of the far filaments from the row of the near wake that they leave, and its rings'."""
     settings, inboard = model.settings, model.settings.inboard
-    points = _along(last_row, _risen(model))
+    points = _along(row, _risen(model))
     if settings.roll_up == "impulse":
         stations = jnp.stack([*map(jnp.asarray, inboard), settings.release])
         return Release(points, trailers(gamma) @ _weights(model.edges**2, stations**2, beyond=True, first=-1))
     gathered = tip_share(model, gamma) * trailers(gamma)
     strength = jnp.sum(gathered)
     if settings.roll_up == "paper":
-        points = points.at[0].set(last_row[-1])
+        points = points.at[0].set(row[-1])
     elif settings.roll_up == "centroid":
         # Γ_tip > 0 wherever the blade lifts; the floor keeps an unloaded blade finite
-        points = points.at[0].set((gathered @ last_row) / jnp.sqrt(strength**2 + 1e-16))
+        points = points.at[0].set((gathered @ row) / jnp.sqrt(strength**2 + 1e-16))
     if not inboard:
         return Release(points, strength[None])
     rest = (trailers(gamma) - gathered) @ _weights(model.edges, jnp.asarray(inboard))

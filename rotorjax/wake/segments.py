@@ -2,13 +2,14 @@
 
 from typing import Literal, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from rotorjax.wake.far_wake import closure, cores, faded, segment_ages, turns_each
 from rotorjax.wake.model import FreeWake, WakeState
-from rotorjax.wake.roll_up import Release, release, trailers
+from rotorjax.wake.roll_up import Release, release, rolled_up, tip_point, trailers
 
 Part = Literal["all", "free", "old"]
 
@@ -30,14 +31,17 @@ def join(*parts: Segments) -> Segments:
 def near_lattice(model: FreeWake, state: WakeState, core: Float[Array, ""]) -> Segments:
     """Near wake of one slice (fields without their K axis): trailed and shed vorticity, every edge once.
 
-    Ring strengths live at nodes; the ring between two ages carries their mean. The spanwise edge at the blade belongs
-    to the bound vortex; that of the last row is where the far filaments take over.
+    Ring strengths live at nodes; the ring between two ages carries their mean, less what the far filaments have taken
+    over (`roll_up.rolled_up`). The spanwise edge at the blade belongs to the bound vortex; at that of the last row the
+    far filaments carry all.
     """
     nodes = lattice_nodes(model, state.near)
     gamma = jnp.concatenate([state.gamma_bound[:, None], state.gamma_near], axis=1)
     rings = 0.5 * (gamma[:, 1:] + gamma[:, :-1])
-    trailed = _segments(nodes[:, :-1], nodes[:, 1:], trailers(rings), core)
-    shed = _segments(nodes[:-1, 1:-1], nodes[1:, 1:-1], jnp.diff(rings, axis=1), core)
+    settings, ages = model.settings, model.settings.lattice_ages
+    left = [1 - rolled_up(settings, at) for at in (0.5 * (ages[1:] + ages[:-1]), ages[1:-1])]
+    trailed = _segments(nodes[:, :-1], nodes[:, 1:], trailers(rings) * left[0], core)
+    shed = _segments(nodes[:-1, 1:-1], nodes[1:, 1:-1], jnp.diff(rings, axis=1) * left[1], core)
     return join(trailed, shed)
 
 
@@ -54,7 +58,16 @@ def lattice_nodes(model: FreeWake, near: Float[Array, "R+1 AN 3"]) -> Float[Arra
 
 def releases(model: FreeWake, state: WakeState) -> Release:
     """Start of the far filaments of one slice."""
-    return release(model, state.near[:, -1], state.gamma_near[:, -1])
+    row = model.settings.release_ages - 1
+    return release(model, state.near[:, row], state.gamma_near[:, row])
+
+
+def tip_vortex(model: FreeWake, near: Float[Array, "R+1 AN 3"], far: Float[Array, "F AF 3"]) -> Float[Array, "A 3"]:
+    """Tip vortex of one slice at `settings.tip_ages`; where it is not released yet, the place in the lattice where it
+    will be.
+    """
+    rows = lattice_nodes(model, near)[:, : model.settings.release_ages + 1]
+    return jnp.concatenate([jax.vmap(lambda row: tip_point(model, row), in_axes=1)(rows), far[0]])
 
 
 def far_filaments(

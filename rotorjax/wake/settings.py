@@ -50,15 +50,17 @@ class WakeSettings(eqx.Module):
     Static (they fix array shapes):
         panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip; with 16 C_T is within 0.6 % of that
             with 40, over three rotors, with 14 within 1.0 %.
-        age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. free_turns: turns of the far filaments that
-            are free to move; closure_turns: further turns that repeat the last free one, one by one;
+        age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. roll_up_start: where along it, 0 to 1, the far
+            filaments start and begin to take its trailers over, by and by up to its end; 1: all of them there. With
+            0.5 C_T of four blades depends less on where that is (docs/free_wake.md). free_turns: turns of the far
+            filaments that are free to move; closure_turns: further turns that repeat the last free one, one by one;
             closure_bundles: bundles of 2, 4, 8, … turns that follow those (far_wake.py). stretch: how many times longer
             the age steps of old turns are than those of young ones (age_grid.py).
         azimuths: K, slices of the periodic wake where it is not axisymmetric, a multiple of the number of blades; None
             for eight or the next such multiple, which `for_blades` writes in.
         inboard: span stations (over R) at which inboard filaments leave the near wake. They carry what the tip vortex
             does not, so that circulation is conserved (Helmholtz). None of them: the paper's single tip vortex.
-        roll_up: strength of the tip vortex and where it leaves the last row of the near wake (roll_up.py).
+        roll_up: strength of the tip vortex and where it leaves the near wake (roll_up.py).
             "impulse": at `release`, trailers shared among all filaments so that circulation and impulse are kept;
             "maximum": at `release`, the smooth maximum of the bound circulation; "centroid": that strength, at the
             circulation-weighted centroid of what it gathers; "paper": that strength, at the last outboard node
@@ -112,6 +114,7 @@ class WakeSettings(eqx.Module):
     panels: int = eqx.field(static=True, default=16)
     age_step_deg: float = eqx.field(static=True, default=15.0)
     near_wake_deg: float = eqx.field(static=True, default=90.0)
+    roll_up_start: float = eqx.field(static=True, default=1.0)
     free_turns: float = eqx.field(static=True, default=2.0)
     stretch: int = eqx.field(static=True, default=1)
     closure_turns: int = eqx.field(static=True, default=2)
@@ -164,6 +167,11 @@ class WakeSettings(eqx.Module):
         return round(self.near_wake_deg / self.age_step_deg)
 
     @property
+    def release_ages(self) -> int:
+        """Ages of the near wake up to where the far filaments start, the blade excluded."""
+        return max(1, round(self.roll_up_start * self.near_ages))
+
+    @property
     def far_ages(self) -> int:
         """Ages of the free part of the far filaments, the release point excluded."""
         return len(self.far_grid.nodes) - 1
@@ -181,17 +189,22 @@ class WakeSettings(eqx.Module):
     @property
     def filament_ages(self) -> Float[np.ndarray, " A_F+1"]:
         """Age (rad, from the blade) of the far filaments' nodes: where they are released, then the free ones."""
-        return self.age_step * (self.near_ages + self.far_grid.nodes)
+        return self.age_step * (self.release_ages + self.far_grid.nodes)
 
     @property
     def segment_ages(self) -> Float[np.ndarray, " P+1"]:
         """Age (rad, from the blade) of the ends of the far filaments' free segments: nodes and what lies between."""
-        return self.age_step * (self.near_ages + self.far_segments.nodes)
+        return self.age_step * (self.release_ages + self.far_segments.nodes)
 
     @property
-    def node_ages(self) -> Float[np.ndarray, " A_N+A_F+1"]:
-        """Age (rad) of all nodes from the blade on: lifting line, near wake, free part of the far filaments."""
-        return np.concatenate([self.age_step * np.arange(self.near_ages + 1), self.filament_ages[1:]])
+    def lattice_ages(self) -> Float[np.ndarray, " A_N+1"]:
+        """Age (rad) of the lattice's rows from the blade on: lifting line, near wake."""
+        return self.age_step * np.arange(self.near_ages + 1)
+
+    @property
+    def tip_ages(self) -> Float[np.ndarray, " A"]:
+        """Age (rad) of the tip vortex's nodes from the blade on: in the lattice up to where it starts, then its own."""
+        return np.concatenate([self.lattice_ages[: self.release_ages], self.filament_ages])
 
     @property
     def steps_per_turn(self) -> int:
@@ -226,6 +239,7 @@ def _check_counts(settings: WakeSettings) -> None:
         if (value := getattr(settings, name)) is not None:
             check_whole(name, value, fewest, most)
     check_range("azimuth_damping", settings.azimuth_damping, _AT_LEAST_0)
+    check_range("roll_up_start", settings.roll_up_start, Range(0.0, 1.0, above=True))
     step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))

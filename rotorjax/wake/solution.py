@@ -179,7 +179,7 @@ def rehearse(model: FreeWake) -> Solution:
 def _fits(start: Solution, model: FreeWake) -> bool:
     """Whether a solution has the blades, nodes, ground and panels of a model."""
     a, b = start.model, model
-    nodes = ("panels", "age_step_deg", "near_ages", "far_ages", "stretch", "filaments", "roll_up")
+    nodes = ("panels", "age_step_deg", "near_ages", "release_ages", "far_ages", "stretch", "filaments", "roll_up")
     same = all(getattr(a.settings, n) == getattr(b.settings, n) for n in nodes)
     same = same and (a.ground is None) == (b.ground is None)
     panels = [0 if one.surfaces is None else len(one.surfaces.panels) for one in (a, b)]

@@ -46,10 +46,9 @@ def in_the_flow(model, state):
 def steady(model):
     """The wake of the closed form, all of one strength."""
     settings, edges = model.settings, np.asarray(model.edges)
-    age = settings.age_step * np.arange(1, settings.near_ages + settings.far_ages + 1)
-    near = np.stack([carried(r, age[: settings.near_ages]) for r in edges])
+    near = np.stack([carried(r, settings.lattice_ages[1:]) for r in edges])
     stations = (float(settings.release), *settings.inboard)
-    far = np.stack([carried(r, age[settings.near_ages :]) for r in stations])
+    far = np.stack([carried(r, settings.filament_ages[1:]) for r in stations])
     ones = np.full((1, settings.panels, settings.near_ages), 0.01)
     return WakeState(
         jnp.asarray(near)[None],

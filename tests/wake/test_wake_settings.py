@@ -1,5 +1,7 @@
 """Settings refuse what cannot be, and say what can."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,8 @@ from rotorjax.wake.settings import MARCHED, hover_settings, quick_settings, wake
         ("age_step_deg", 7.0),
         ("age_step_deg", -15.0),
         ("near_wake_deg", 40.0),
+        ("roll_up_start", 0.0),
+        ("roll_up_start", 1.1),
         ("free_turns", 1.0),
         ("stretch", 5),
         ("spreading", -0.1),
@@ -39,6 +43,11 @@ def test_bad_values_are_named(name, value):
 def test_counts_follow_from_angles():
     settings = wake_settings(age_step_deg=15.0, near_wake_deg=60.0, free_turns=3.5, inboard=(0.4,))
     assert (settings.near_ages, settings.far_ages, settings.steps_per_turn, settings.filaments) == (4, 84, 24, 2)
+    assert settings.release_ages == 4
+    halfway = replace(settings, roll_up_start=0.5)
+    assert (halfway.near_ages, halfway.release_ages) == (4, 2)
+    assert np.rad2deg(halfway.tip_ages[[0, 1, 2, 3, -1]]) == pytest.approx([0, 15, 30, 45, 30 + 3.5 * 360])
+    assert replace(settings, roll_up_start=0.01).release_ages == 1
 
 
 def test_long_steps_need_room_and_divide_a_turn():
