@@ -39,7 +39,7 @@ def test_section_blades_are_the_blade_element_up_to_the_tip_loss():
     lifting = np.clip((0.97 - inner) / np.array(at.widths), 0, 1)
     assert lifting[-1] < 1
     assert lifting[-3] == 1
-    np.testing.assert_allclose(mine, disk_loading(rotor, loads) * lifting, rtol=1e-13)
+    np.testing.assert_allclose(mine, disk_loading(rotor, loads) * lifting, rtol=1e-14)
     advancing = SectionBlades(rotor, operating).loading(down, jnp.array(0.3), jnp.array(0.1), at)
     assert np.all(advancing[1] > advancing[3])
 

@@ -44,12 +44,20 @@ def test_pair_derivatives_are_those_of_the_kernel():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ground", [None, plane(0.9)], ids=["free", "level"])
-def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, ground, monkeypatch):
+@pytest.mark.parametrize(
+    ("ground", "start"), [(None, 1.0), (plane(0.9), 1.0), (plane(0.9), 0.5)], ids=["free", "level", "by and by"]
+)
+def test_harmonic_inverse_is_the_inverse_jacobian_of_an_axisymmetric_wake(uh60, ground, start, monkeypatch):
     """Any axisymmetric wake will do, solved or not: the identity is algebra."""
     inversion, asked = spied_inversion(monkeypatch)
     settings = wake_settings(
-        panels=5, age_step_deg=30.0, near_wake_deg=120.0, closure_turns=1, closure_bundles=1, azimuths=8
+        panels=5,
+        age_step_deg=30.0,
+        near_wake_deg=120.0,
+        roll_up_start=start,
+        closure_turns=1,
+        closure_bundles=1,
+        azimuths=8,
     )
     model = free_wake(*uh60, ground, settings)
     x = prescribed(model)
