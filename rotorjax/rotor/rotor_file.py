@@ -108,7 +108,7 @@ def _build(data: Tables, folder: Path) -> tuple[geometry.Rotor, OperatingPoint]:
         blades=body["blades"],
         radius=body["radius"],
         root_cutout=body["root_cutout"],
-        tip_loss=body.get("tip_loss", 1.0),
+        tip_loss=body.get("tip_loss", geometry.TIP_LOSS),
         chord=body["chord"],
         twist=_in_radians(_twist(body)),
         sweep=_in_radians(body.get("sweep_deg", 0.0)),

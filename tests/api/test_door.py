@@ -14,6 +14,7 @@ import rotorjax as rj
 from rotorjax.bench.mean_flow import LENGTH, streamlines
 from rotorjax.ode.models import LinearModel
 from rotorjax.potential import model as potential
+from rotorjax.rotor import geometry
 
 SETTINGS = rj.WakeSettings(**COARSE, azimuths=4)
 RIM = jnp.array([[0.5, 0.0, -0.3], [0.0, -0.7, -0.2], [1.2, 0.3, 0.1]])
@@ -50,11 +51,23 @@ def test_it_opens_without_loading_the_house_or_touching_jax():
 
 
 def test_rooms_with_the_name_of_a_function_are_both(uh60):
-    from rotorjax.rotor import geometry
-
     assert rj.rotor.geometry is geometry
     assert rj.rotor("uh60")[0].name == "UH-60A"
     assert float(jnp.rad2deg(uh60[1].collective)) == pytest.approx(18.0)
+
+
+@pytest.mark.parametrize(("blades", "collective_deg"), [(2, 8.0), (4, 10.0)])
+def test_a_rotor_that_says_nothing_of_its_tips_pays_for_its_lift(blades, collective_deg):
+    """Induced power over the ideal in hover: about 1, and far below it where the lift goes on to the end."""
+    file, hover = rj.rotor("knight_hefner_2", collective_deg)
+
+    def factor(**tip):
+        rotor = geometry.rotor("plain", blades, file.radius, 0.17, 0.05, file.airfoil, **tip)
+        found = rj.solve(rj.finite_state(rotor, hover))
+        return float(found.CP_induced / (found.CT**1.5 / np.sqrt(2)))
+
+    assert factor() == pytest.approx(1.0, abs=0.06)
+    assert factor(tip_loss=1.0) < 0.9
 
 
 @pytest.mark.slow

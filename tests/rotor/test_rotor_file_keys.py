@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotorjax.errors import InputError
-from rotorjax.rotor import catalogue
+from rotorjax.rotor import catalogue, geometry
 from rotorjax.rotor.rotor_file import SCHEMA
 
 REPORTS = Path(__file__).parents[1] / "data" / "reports"
@@ -17,7 +17,7 @@ NEEDED |= {"airfoil": "", "operating": "rpm = 1200.0\ncollective_deg = 8.0\n"}
 NEEDED |= {"hinge": "offset = 0.05\nblade_mass = 1.2\nfirst_moment = 0.55\nflap_inertia = 0.33\n"}
 FURTHER = {
     "rotor": {
-        "tip_loss": ["0.97"],
+        "tip_loss": ["0.96"],
         "twist_deg": ["{ r = [0.0, 1.0], value = [4.0, -4.0] }"],
         "linear_twist_deg": ["-8.0"],
         "sweep_deg": ["5.0"],
@@ -98,6 +98,11 @@ def combinations(rng):
 def test_all_keys_are_here():
     for table, keys in SCHEMA.items():
         assert {key for key, what in keys.items() if not what.required} == set(FURTHER[table])
+
+
+def test_a_rotor_without_a_tip_loss_has_the_one_of_most(folder):
+    rotor, _ = load(folder, {"rotor": {}, "airfoil": {"file": '"full.csv"'}, "operating": {}})
+    assert float(rotor.tip_loss) == geometry.TIP_LOSS
 
 
 def test_every_key_that_is_accepted_has_an_effect(folder):
