@@ -11,11 +11,12 @@ from rotorjax.checks import Range, array, check_range, check_whole, known, shown
 from rotorjax.errors import InputError
 from rotorjax.wake.age_grid import AgeGrid, Halved, age_grid, halved, least
 
-_USUAL_AZIMUTHS = 8
+_USUAL_AZIMUTHS, _USUAL_LATTICE, _FEWEST = 8, 90.0, 4
 RollUp = Literal["impulse", "maximum", "centroid", "paper"]
 BoundFilter = Literal["pass", "solution"]
 PairSums = Literal["rows", "products"]
 Number = Any  # Float[Array, ""]; given as a plain number too
+_STEP = Range(1.0, 360.0, "deg")
 _POSITIVE, _AT_LEAST_0 = Range(0.0, 1e3, above=True), Range(0.0, 1e3)
 RANGES: dict[str, Range] = {
     "release": Range(0.0, 1.0),
@@ -50,7 +51,8 @@ class WakeSettings(eqx.Module):
     Static (they fix array shapes):
         panels: R, spanwise panels, cosine-spaced from the root cut-out to the tip; with 16 C_T is within 0.6 % of that
             with 40, over three rotors, with 14 within 1.0 %.
-        age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice. roll_up_start: where along it, 0 to 1, the far
+        age_step_deg: Δζ. near_wake_deg: extent of the near-wake lattice; None for the whole number of age steps, four
+            or more, that is nearest to 90°, which is written in. roll_up_start: where along it, 0 to 1, the far
             filaments start and begin to take its trailers over, by and by up to its end; 1: all of them there. With
             0.5 C_T of four blades depends less on where that is (docs/free_wake.md). free_turns: turns of the far
             filaments that are free to move; closure_turns: further turns that repeat the last free one, one by one;
@@ -113,7 +115,7 @@ class WakeSettings(eqx.Module):
 
     panels: int = eqx.field(static=True, default=16)
     age_step_deg: float = eqx.field(static=True, default=15.0)
-    near_wake_deg: float = eqx.field(static=True, default=90.0)
+    near_wake_deg: float = eqx.field(static=True, default=None)  # type: ignore[assignment]  (a number once it is made)
     roll_up_start: float = eqx.field(static=True, default=1.0)
     free_turns: float = eqx.field(static=True, default=2.0)
     stretch: int = eqx.field(static=True, default=1)
@@ -146,6 +148,9 @@ class WakeSettings(eqx.Module):
     def __post_init__(self) -> None:
         """Check every number and make the differentiable ones arrays."""
         self.inboard = tuple(self.inboard)
+        if self.near_wake_deg is None:
+            step = check_range("age_step_deg", self.age_step_deg, _STEP)
+            self.near_wake_deg = step * max(_FEWEST, round(_USUAL_LATTICE / step))
         for name, allowed in RANGES.items():
             setattr(self, name, array(check_range(name, getattr(self, name), allowed)))
         _check_counts(self)
@@ -240,7 +245,7 @@ def _check_counts(settings: WakeSettings) -> None:
             check_whole(name, value, fewest, most)
     check_range("azimuth_damping", settings.azimuth_damping, _AT_LEAST_0)
     check_range("roll_up_start", settings.roll_up_start, Range(0.0, 1.0, above=True))
-    step = check_range("age_step_deg", settings.age_step_deg, Range(1.0, 360.0, "deg"))
+    step = check_range("age_step_deg", settings.age_step_deg, _STEP)
     check_range("near_wake_deg", settings.near_wake_deg, Range(1.0, 720.0, "deg"))
     check_range("free_turns", settings.free_turns, Range(0.1, 50.0))
     steps = 360 / step if step > 0 else 0.5
@@ -250,7 +255,7 @@ def _check_counts(settings: WakeSettings) -> None:
         )
     for name, value in (("near_wake_deg", settings.near_wake_deg), ("free_turns", settings.free_turns * 360)):
         ages = value / step
-        if abs(ages - round(ages)) > 1e-9 or ages < 4:
+        if abs(ages - round(ages)) > 1e-9 or ages < _FEWEST:
             raise InputError(
                 f"Argument `{name}` must be a whole number of age steps ({step} deg), at least four, "
                 f"but is {ages:.3g} of them"

@@ -50,6 +50,11 @@ def test_counts_follow_from_angles():
     assert replace(settings, roll_up_start=0.01).release_ages == 1
 
 
+@pytest.mark.parametrize(("step", "lattice"), [(7.5, 90.0), (10.0, 90.0), (15.0, 90.0), (20.0, 80.0), (30.0, 120.0)])
+def test_a_lattice_that_is_not_asked_for_has_whole_steps(step, lattice):
+    assert wake_settings(age_step_deg=step).near_wake_deg == lattice
+
+
 def test_long_steps_need_room_and_divide_a_turn():
     with pytest.raises(InputError, match=r"`free_turns` must be at least 2\.75 where stretch is 2"):
         wake_settings(free_turns=2.5, stretch=2)
