@@ -68,8 +68,15 @@ def as_marched(at: Point, quick: bool) -> Point:
 
 
 def needed(task: Point, tasks: Sequence[Point]) -> Point | None:
-    """The wake that `task` starts from: among those before it with its rotor and settings, the nearest."""
-    before = [p for p in tasks[: tasks.index(task)] if p.rotor == task.rotor and p.changes == task.changes]
+    """The wake that `task` starts from: among those before it with its rotor and settings, the nearest.
+
+    Over level ground one with other free turns than most starts from the same with as many as most.
+    """
+    earlier = tasks[: tasks.index(task)]
+    usual = replace(task, changes=tuple(change for change in task.changes if change[0] != "free_turns"))
+    if not task.slope_deg and usual != task and usual in earlier:
+        return usual
+    before = [p for p in earlier if p.rotor == task.rotor and p.changes == task.changes]
     before = [p for p in before if p.height is None or _is_further(p, task)]
 
     def distance(p: Point) -> tuple[float, float]:

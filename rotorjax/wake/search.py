@@ -20,7 +20,7 @@ from rotorjax.rotor.geometry import twist
 from rotorjax.wake.equilibrium import METHOD, Unknowns, look, told
 from rotorjax.wake.model import FreeWake
 from rotorjax.wake.preconditioner import HarmonicInverse, harmonic_inverse
-from rotorjax.wake.start import laid_level, prescribed, with_the_ground
+from rotorjax.wake.start import laid_level, prescribed, shorter, with_the_ground, with_turns
 
 Progress = Callable[[str, float], None]
 
@@ -79,7 +79,7 @@ class Search:
 
     def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
         """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
-        is none, and where that is lost by way of less pitch, a distant ground or the auxiliary flow.
+        is none, and where that is lost by way of fewer turns, less pitch, a distant ground or the auxiliary flow.
         """
         self.inverse = None
         found = self.from_guess(model, prescribed(model) if guess is None else guess, self.tol)
@@ -87,6 +87,12 @@ class Search:
         self.ok, self.why = found.converged, found.why
         if found.converged or found.interrupted:
             return model, found.x
+        if (short := shorter(model)) is not None:
+            here, x = self.from_nothing(short)
+            if self.ok:
+                here, x = self.with_turns(model, with_turns(x, here, model.settings.far_ages))
+            if self.ok or self.interrupted:
+                return here, x
         self.hard = True
         if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)
@@ -148,6 +154,22 @@ class Search:
         if found.converged or found.interrupted:
             return on_host(model), found.x
         return self.follow(lambda s: on_host(eqx.tree_at(share, model, np.asarray(s))), x, "share of surfaces", 0.5)
+
+    def with_turns(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
+        """From a wake that had fewer free turns, or more (`start.with_turns`), a level one first without an inverse."""
+        model, level = on_host(model), x.near.shape[0] == 1
+        if level and not self.hard:
+            found = self.from_guess(model, x, self.tol)
+            self.note("free turns", found)
+            self.ok, self.why = found.converged, found.why
+            if found.converged or found.interrupted:
+                return model, found.x
+        self.hard = True
+        self.prepare(model, x)
+        found = self.from_guess(model, x, self.tol)
+        self.note("free turns", found)
+        self.ok, self.why = found.converged, found.why
+        return model, found.x
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""

@@ -217,6 +217,12 @@ class WakeSettings(eqx.Module):
         return round(360 / self.age_step_deg)
 
     @property
+    def least_turns(self) -> float:
+        """Fewest free turns that have room for the two that a closure goes by, and for long steps."""
+        turn = self.steps_per_turn
+        return 2.0 if self.stretch == 1 else least(turn, self.stretch) / turn
+
+    @property
     def old_segments_per_turn(self) -> int:
         """Segments in the last free turn and in each that repeats it one by one."""
         return round(2 * np.pi / float(np.diff(self.segment_ages[-2:])[0]))
@@ -273,9 +279,9 @@ def _check_stretch(settings: WakeSettings, turn: int) -> None:
     stretch = check_whole("stretch", settings.stretch, 1, 4)
     if turn % stretch:
         raise InputError(f"Argument `stretch` must divide the {turn} steps of a turn, but is {stretch}: try 2")
-    if stretch > 1 and settings.free_turns * turn < least(turn, stretch):
+    if stretch > 1 and settings.free_turns < settings.least_turns:
         raise InputError(
-            f"Argument `free_turns` must be at least {least(turn, stretch) / turn:.3g} where stretch is {stretch} (two "
+            f"Argument `free_turns` must be at least {settings.least_turns:.3g} where stretch is {stretch} (two "
             f"turns of long steps at the end), but is {settings.free_turns}: raise it or set stretch = 1"
         )
 

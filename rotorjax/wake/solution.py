@@ -23,7 +23,7 @@ from rotorjax.wake.field import leaked, velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, on_host
-from rotorjax.wake.start import prescribed
+from rotorjax.wake.start import lengthens, prescribed, with_turns
 
 Number = Numbers = Any  # of numpy, or traced by jax
 
@@ -112,8 +112,9 @@ def solve(
 ) -> Solution:
     """Find the periodic wake of a model, from a prescribed wake or from the solution of a neighbouring case.
 
-    start: a solution with the same rotor and settings; used where both have ground, or neither. Where the way from it
-    is lost, the one from nothing is tried; a level wake is sought from it at once first, in small steps last.
+    start: a solution with the same rotor and settings, but for numbers and free turns: a longer wake is found from a
+    shorter one. Used where both have ground, or neither. Where the way from it is lost, the one from nothing is tried;
+    a level wake is sought from it at once first, in small steps last.
     progress(stage, residual) is called after each continuation step. tol: relative rms of the residual. A solve that
     does not get there comes back with `converged` False, the reason, and the last good state.
     """
@@ -153,7 +154,10 @@ def _way(model: FreeWake, start: Solution | None, search: Search) -> tuple[FreeW
         # the static choices are the model's own (azimuths may differ), the numbers the start's
         numbers = jax.tree.leaves(start.model.settings)
         settings = jax.tree.unflatten(jax.tree.structure(model.settings), numbers)
-        here, x = eqx.tree_at(lambda m: m.settings, start.model, settings), start.unknowns
+        here = eqx.tree_at(lambda m: m.settings, start.model, settings)
+        x = start.unknowns
+        if settings.far_ages != start.model.settings.far_ages:
+            here, x = search.with_turns(here, with_turns(x, start.model, settings.far_ages))
     if search.ok:
         slices = 1 if model.axisymmetric else model.settings.azimuths
         if x.near.shape[0] > slices:
@@ -179,8 +183,10 @@ def rehearse(model: FreeWake) -> Solution:
 def _fits(start: Solution, model: FreeWake) -> bool:
     """Whether a solution has the blades, nodes, ground and panels of a model."""
     a, b = start.model, model
-    nodes = ("panels", "age_step_deg", "near_ages", "release_ages", "far_ages", "stretch", "filaments", "roll_up")
+    nodes = ("panels", "age_step_deg", "near_ages", "release_ages", "stretch", "filaments", "roll_up")
     same = all(getattr(a.settings, n) == getattr(b.settings, n) for n in nodes)
+    short, long = sorted((a.settings, b.settings), key=lambda s: s.far_ages)
+    same = same and (short.far_ages == long.far_ages or lengthens(short, long))
     same = same and (a.ground is None) == (b.ground is None)
     panels = [0 if one.surfaces is None else len(one.surfaces.panels) for one in (a, b)]
     same = same and panels[0] == panels[1]

@@ -1,4 +1,6 @@
-"""Guesses of the wake: a prescribed one (after Landgrebe 1972), and a solved one moved to another ground."""
+"""Guesses of the wake: a prescribed one (after Landgrebe 1972), a solved one with more turns or another ground."""
+
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -8,8 +10,11 @@ from jaxtyping import Array, Float
 
 from rotorjax.frames import rotate_about_shaft
 from rotorjax.ground import Plane
-from rotorjax.wake.equilibrium import Unknowns
-from rotorjax.wake.model import FreeWake
+from rotorjax.wake.equilibrium import Unknowns, full_state
+from rotorjax.wake.far_wake import closure
+from rotorjax.wake.model import FreeWake, azimuths
+from rotorjax.wake.segments import points_between
+from rotorjax.wake.settings import WakeSettings
 
 
 def prescribed(model: FreeWake, inflow: float = 0.055) -> Unknowns:
@@ -41,6 +46,48 @@ def _prescribed(model: FreeWake, inflow: Float[Array, ""]) -> Unknowns:
     far = jnp.stack([x, y, jnp.broadcast_to(-depth, x.shape)], axis=-1)
     gamma = 0.36 * model.chords * jnp.sqrt(jnp.clip(1 - ((model.stations - 0.65) / 0.37) ** 2, 0, 1))
     return Unknowns(near[None], far[None], gamma[None])
+
+
+def lengthens(short: WakeSettings, long: WakeSettings) -> bool:
+    """Whether a longer wake's free nodes begin with a shorter one's, which has the turns that its closure goes by."""
+    return short.free_turns >= short.least_turns and np.array_equal(
+        short.far_grid.nodes, long.far_grid.nodes[: short.far_ages + 1]
+    )
+
+
+def shorter(model: FreeWake) -> FreeWake | None:
+    """The model with half of its free turns or little more; None where no shorter wake can be lengthened to it."""
+    settings = model.settings
+    half = int(np.ceil(max(settings.free_turns / 2, settings.least_turns)))
+    for turns in range(half, int(np.ceil(settings.free_turns))):
+        short = replace(settings, free_turns=float(turns))
+        if lengthens(short, settings):
+            return eqx.tree_at(lambda m: m.settings, model, short)
+    return None
+
+
+def with_turns(x: Unknowns, model: FreeWake, far_ages: int) -> Unknowns:
+    """The model's wake with `far_ages` free nodes a filament: cut off there, or lengthened by turns of its closure.
+
+    The guess that a longer wake needs: one over ground is hardly found from a prescribed wake.
+    """
+    more = far_ages - model.settings.far_ages
+    return x._replace(far=x.far[:, :, :far_ages]) if more <= 0 else _lengthened(model, x, more)
+
+
+@eqx.filter_jit
+def _lengthened(model: FreeWake, x: Unknowns, more: int) -> Unknowns:
+    settings = model.settings
+    each = settings.old_segments_per_turn // settings.bundle_skip
+    turns = replace(settings, closure_turns=-(-more // each), closure_bundles=0)
+    one_by_one = eqx.tree_at(lambda m: m.settings, model, turns)
+    state, start = full_state(model, x)
+
+    def after(points, far, psi):
+        nodes = points_between(model, jnp.concatenate([points[:, None], far], axis=1))
+        return closure(one_by_one, nodes, psi)[:, settings.bundle_skip - 1 :: settings.bundle_skip][:, :more]
+
+    return x._replace(far=jnp.concatenate([x.far, jax.vmap(after)(start.points, x.far, azimuths(state))], axis=2))
 
 
 def with_the_ground(x: Unknowns, before: Plane | None, after: Plane | None) -> Unknowns:

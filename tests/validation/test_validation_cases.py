@@ -92,7 +92,11 @@ def test_the_grids_wakes_differ_in_one_number_and_each_near_the_ground_has_one_t
         assert replace(finer, changes=()) == base
     assert {base.slope_deg for base, _ in pairs} == {0.0, 10.0, 20.0, 30.0}
     for task in tasks:
-        assert (needed(task, tasks) is None) == (task.height is None)
+        near = needed(task, tasks)
+        if task.changes and task.changes[0][0] == "free_turns" and not task.slope_deg:
+            assert near == replace(task, changes=())
+        else:
+            assert (near is None) == (task.height is None)
 
 
 def test_a_wake_that_fails_takes_out_the_rows_that_are_read_from_it(coarse_hover):
@@ -222,6 +226,12 @@ def test_wakes_start_from_their_neighbours():
     tasks = [free, high, low, gentle, steep, replace(low, height=0.75)]
     assert [needed(task, tasks) for task in tasks] == [None, free, high, low, gentle, low]
     assert point("uh60") == free
+    longer = replace(low, changes=(("free_turns", 8.0),))
+    tasks = [high, replace(longer, height=2.0), low, longer, replace(longer, height=0.75)]
+    assert [needed(task, tasks) for task in tasks] == [None, high, high, low, longer]
+    gentle = replace(low, slope_deg=10.0)
+    tasks = [low, longer, gentle, replace(longer, slope_deg=10.0)]
+    assert [needed(task, tasks) for task in tasks] == [None, low, low, longer]
 
 
 def test_cases_that_suit_the_subject():

@@ -15,6 +15,7 @@ from rotorjax.wake.far_wake import REACH, repeats, segment_ages, turns_each
 from rotorjax.wake.model import WakeState, free_wake
 from rotorjax.wake.roll_up import Release
 from rotorjax.wake.settings import wake_settings
+from rotorjax.wake.start import prescribed, shorter, with_turns
 
 PITCH, RADIUS = 0.04, 0.75
 ZERO = jnp.zeros(())
@@ -46,6 +47,33 @@ def inflow(model, points):
     state = WakeState(near, nodes[:, 1:], nothing, strength, nothing[:, 0])
     far = far_filaments(model, state, Release(nodes[:, 0], alone), ZERO)
     return -segment_velocity(points, *far, plane=model.ground, blades=model.rotor.blades)[:, 2]
+
+
+@pytest.mark.parametrize(("stretch", "more"), [(1, 30), (2, 12), (2, 17)])
+def test_a_wake_gets_more_turns_by_going_on_as_it_did(stretch, more):
+    """A helix stays one; what is cut off again is what there was."""
+    model = model_of(free_turns=3.0, stretch=stretch)
+    x = prescribed(model)._replace(far=helices(model)[None, :, 1:])
+    longer = with_turns(x, model, model.settings.far_ages + more)
+    goes_on = model.settings.filament_ages[-1] + stretch * model.settings.age_step * np.arange(1, more + 1)
+    helix = [RADIUS * np.cos(goes_on), -RADIUS * np.sin(goes_on), -PITCH * goes_on]
+    for filament in longer.far[0]:
+        np.testing.assert_allclose(filament[-more:], np.stack(helix, axis=-1), atol=1e-12)
+    there = model_of(free_turns=4.0, stretch=stretch)
+    shorter = with_turns(longer, there, model.settings.far_ages)
+    np.testing.assert_array_equal(shorter.far, x.far)
+
+
+@pytest.mark.parametrize(("stretch", "turns", "half"), [(1, 4.0, 2.0), (1, 5.0, 3.0), (2, 8.0, 4.0), (2, 6.0, 4.0)])
+def test_a_wake_is_found_from_half_its_turns_where_its_nodes_begin_so(stretch, turns, half):
+    short = shorter(model_of(free_turns=turns, stretch=stretch))
+    assert short.settings.free_turns == half
+
+
+@pytest.mark.parametrize(("stretch", "turns"), [(1, 2.0), (2, 4.0), (2, 3.0)])
+def test_a_wake_that_is_as_short_as_can_be_is_found_from_none(stretch, turns):
+    """The usual one too: with fewer turns its old steps would begin sooner."""
+    assert shorter(model_of(free_turns=turns, stretch=stretch)) is None
 
 
 DISK = jnp.array([[0.1, 0.0, 0.0], [0.3, 0.2, 0.0], [0.0, 0.6, 0.0], [0.9, 0.0, 0.0]])

@@ -102,12 +102,45 @@ def test_clearance_is_over_the_slope_as_each_blade_has_it(coarse, uh60):
     assert lowest(high, node) == pytest.approx(2.5 / np.sqrt(2))
 
 
+@pytest.fixture(scope="module")
+def sloped(uh60, coarse_slope, grounded):
+    return solve(free_wake(*uh60, plane(1.0, 4.0), coarse_slope), start=grounded)
+
+
 @pytest.mark.slow
-def test_nothing_flows_through_a_slope(uh60, coarse_slope, grounded):
+def test_nothing_flows_through_a_slope(sloped):
     """Mountain and valley side differ by 0.3 %, less than this coarse wake knows: test_documents.py looks at them."""
-    found = solve(free_wake(*uh60, plane(1.0, 4.0), coarse_slope), start=grounded)
+    assert sloped.converged, sloped.why
+    assert sloped.ground_normal_velocity_rms < 1e-10
+
+
+def test_a_longer_wake_is_found_from_a_shorter_one_and_back(grounded):
+    """In few iterations, at another height too; the shorter one comes out as it was. From nothing the way leads over a
+    shorter one as well, where the prescribed wake is lost.
+    """
+    settings = replace(grounded.model.settings, free_turns=grounded.model.settings.free_turns + 2.0)
+    longer = eqx.tree_at(lambda m: (m.settings, m.ground.height), grounded.model, (settings, jnp.asarray(1.05)))
+    found = solve(longer, start=grounded)
     assert found.converged, found.why
-    assert found.ground_normal_velocity_rms < 1e-10
+    assert found.state.far.shape[2] == settings.far_ages > grounded.state.far.shape[2]
+    assert found.iterations <= 8
+    stages = []
+    alone = solve(longer, progress=lambda stage, residual: stages.append(stage))
+    assert stages == ["prescribed wake", "prescribed wake", "free turns", "case"]
+    np.testing.assert_allclose(found.CT, alone.CT, rtol=1e-6)
+    back = solve(grounded.model, start=found)
+    assert back.converged, back.why
+    np.testing.assert_allclose(back.CT, grounded.CT, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_a_longer_wake_over_a_slope_is_found_from_a_shorter_one(sloped):
+    settings = replace(sloped.model.settings, free_turns=3.0)
+    longer, stages = eqx.tree_at(lambda m: m.settings, sloped.model, settings), []
+    found = solve(longer, sloped, lambda stage, residual: stages.append(stage))
+    assert found.converged, found.why
+    assert stages == ["free turns", "case"]
+    np.testing.assert_allclose(found.CT, sloped.CT, rtol=0.02)
 
 
 def test_a_solve_that_is_lost_says_so_and_keeps_what_it_had(uh60, coarse, hover, monkeypatch):
