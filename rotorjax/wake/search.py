@@ -93,6 +93,7 @@ class Search:
                 here, x = self.with_turns(model, with_turns(x, here, model.settings.far_ages))
             if self.ok or self.interrupted:
                 return here, x
+            self.inverse = None  # it may be the shorter wake's
         self.hard = True
         if model.ground is None or model.ground.height >= DISTANT:
             return self.by_way_of_washout(model)

@@ -133,6 +133,20 @@ def test_a_longer_wake_is_found_from_a_shorter_one_and_back(grounded):
     np.testing.assert_allclose(back.CT, grounded.CT, rtol=1e-6)
 
 
+def test_a_wake_that_a_shorter_one_does_not_lead_to_is_sought_by_the_other_ways(grounded, monkeypatch):
+    def lost(self, model, x):
+        self.hard, self.ok, self.why = True, False, "lost"
+        self.prepare(grounded.model, grounded.unknowns)
+        return grounded.model, grounded.unknowns
+
+    monkeypatch.setattr(search.Search, "with_turns", lost)
+    settings = replace(grounded.model.settings, free_turns=grounded.model.settings.free_turns + 2.0)
+    longer, stages = eqx.tree_at(lambda m: m.settings, grounded.model, settings), []
+    found = solve(longer, progress=lambda stage, residual: stages.append(stage))
+    assert found.converged, found.why
+    assert "half the pitch" in stages
+
+
 @pytest.mark.slow
 def test_a_longer_wake_over_a_slope_is_found_from_a_shorter_one(sloped):
     settings = replace(sloped.model.settings, free_turns=3.0)
