@@ -77,20 +77,18 @@ class Search:
     hard: bool = False
     at_once: bool = False
 
-    def from_nothing(self, model: FreeWake, guess: Unknowns | None = None) -> tuple[FreeWake, Unknowns]:
-        """Axisymmetric wake of a model over level ground or none: straight from a guess, a prescribed wake where there
-        is none, and where that is lost by way of fewer turns, less pitch, a distant ground or the auxiliary flow.
+    def from_nothing(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
+        """Axisymmetric wake of a model over level ground or none: straight from a prescribed wake, and where that is
+        lost by way of fewer turns, less pitch, a distant ground or the auxiliary flow.
         """
         self.inverse = None
-        found = self.from_guess(model, prescribed(model) if guess is None else guess, self.tol)
-        self.note("prescribed wake", found)
-        self.ok, self.why = found.converged, found.why
+        found = self.ended("prescribed wake", self.from_guess(model, prescribed(model), self.tol))
         if found.converged or found.interrupted:
             return model, found.x
         if (short := shorter(model)) is not None:
             here, x = self.from_nothing(short)
             if self.ok:
-                here, x = self.with_turns(model, with_turns(x, here, model.settings.far_ages))
+                here, x = self.other_turns(here, model, x)
             if self.ok or self.interrupted:
                 return here, x
             self.inverse = None  # it may be the shorter wake's
@@ -110,9 +108,7 @@ class Search:
         collective = np.asarray(model.operating.collective)
         pitch = collective + np.asarray(twist(model.rotor, jnp.asarray(0.75)))
         light = on_host(eqx.tree_at(lambda m: m.operating.collective, model, collective - 0.5 * pitch))
-        found = self.from_guess(light, prescribed(light), self.tol)
-        self.note("half the pitch", found)
-        self.ok, self.why = found.converged, found.why
+        found = self.ended("half the pitch", self.from_guess(light, prescribed(light), self.tol))
         return self.move(light, model, found.x, "more pitch", 0.5) if self.ok else (light, found.x)
 
     def by_way_of_washout(self, model: FreeWake) -> tuple[FreeWake, Unknowns]:
@@ -149,35 +145,25 @@ class Search:
         Over a large deck that wake is nearly the one; beside a wall it is the one that the wall's flow is added to.
         """
         self.prepare(model, x)
-        found = self.newton(model, x, self.tol)
-        self.note("surfaces", found)
-        self.ok, self.why = found.converged, found.why
+        found = self.ended("surfaces", self.newton(model, x, self.tol))
         if found.converged or found.interrupted:
             return on_host(model), found.x
         return self.follow(lambda s: on_host(eqx.tree_at(share, model, np.asarray(s))), x, "share of surfaces", 0.5)
 
-    def with_turns(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
-        """From a wake that had fewer free turns, or more (`start.with_turns`), a level one first without an inverse."""
-        model, level = on_host(model), x.near.shape[0] == 1
-        if level and not self.hard:
-            found = self.from_guess(model, x, self.tol)
-            self.note("free turns", found)
-            self.ok, self.why = found.converged, found.why
+    def other_turns(self, here: FreeWake, there: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
+        """From a wake with fewer free turns, or more (`start.with_turns`); a level one first without an inverse."""
+        there, x = on_host(there), with_turns(x, here, there.settings.far_ages)
+        if x.near.shape[0] == 1 and not self.hard:
+            found = self.ended("free turns", self.from_guess(there, x, self.tol))
             if found.converged or found.interrupted:
-                return model, found.x
+                return there, found.x
         self.hard = True
-        self.prepare(model, x)
-        found = self.from_guess(model, x, self.tol)
-        self.note("free turns", found)
-        self.ok, self.why = found.converged, found.why
-        return model, found.x
+        self.prepare(there, x)
+        return there, self.ended("free turns", self.from_guess(there, x, self.tol)).x
 
     def settle(self, model: FreeWake, x: Unknowns) -> tuple[FreeWake, Unknowns]:
         """Newton at the model itself."""
-        found = self.newton(model, x, self.tol)
-        self.note("case", found)
-        self.ok, self.why = found.converged, found.why
-        return model, found.x
+        return model, self.ended("case", self.newton(model, x, self.tol)).x
 
     def follow(
         self,
@@ -244,6 +230,12 @@ class Search:
             return
         about, laid = on_host(model.levelled), laid_level(x, model.floor)
         self.inverse = harmonic_inverse(about, laid, x.near.shape[0], look(about, laid)[1])
+
+    def ended(self, stage: str, found: Outcome) -> Outcome:
+        """Count the step with which a way ends, and take over whether it got there."""
+        self.note(stage, found)
+        self.ok, self.why = found.converged, found.why
+        return found
 
     def note(self, stage: str, found: Outcome) -> None:
         """Count a step and show it."""

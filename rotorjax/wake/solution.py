@@ -23,7 +23,7 @@ from rotorjax.wake.field import leaked, velocity
 from rotorjax.wake.model import FreeWake, WakeState, azimuths
 from rotorjax.wake.performance import performance
 from rotorjax.wake.search import Progress, Search, on_host
-from rotorjax.wake.start import lengthens, prescribed, with_turns
+from rotorjax.wake.start import lengthens, prescribed
 
 Number = Numbers = Any  # of numpy, or traced by jax
 
@@ -154,10 +154,9 @@ def _way(model: FreeWake, start: Solution | None, search: Search) -> tuple[FreeW
         # the static choices are the model's own (azimuths may differ), the numbers the start's
         numbers = jax.tree.leaves(start.model.settings)
         settings = jax.tree.unflatten(jax.tree.structure(model.settings), numbers)
-        here = eqx.tree_at(lambda m: m.settings, start.model, settings)
-        x = start.unknowns
+        here, x = eqx.tree_at(lambda m: m.settings, start.model, settings), start.unknowns
         if settings.far_ages != start.model.settings.far_ages:
-            here, x = search.with_turns(here, with_turns(x, start.model, settings.far_ages))
+            here, x = search.other_turns(start.model, here, x)
     if search.ok:
         slices = 1 if model.axisymmetric else model.settings.azimuths
         if x.near.shape[0] > slices:

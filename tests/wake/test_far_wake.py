@@ -60,8 +60,8 @@ def test_a_wake_gets_more_turns_by_going_on_as_it_did(stretch, more):
     for filament in longer.far[0]:
         np.testing.assert_allclose(filament[-more:], np.stack(helix, axis=-1), atol=1e-12)
     there = model_of(free_turns=4.0, stretch=stretch)
-    shorter = with_turns(longer, there, model.settings.far_ages)
-    np.testing.assert_array_equal(shorter.far, x.far)
+    cut = with_turns(longer, there, model.settings.far_ages)
+    np.testing.assert_array_equal(cut.far, x.far)
 
 
 @pytest.mark.parametrize(("stretch", "turns", "half"), [(1, 4.0, 2.0), (1, 5.0, 3.0), (2, 8.0, 4.0), (2, 6.0, 4.0)])
