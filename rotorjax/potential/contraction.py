@@ -37,7 +37,7 @@ from rotorjax.potential.modes import ModeTable, rotor_modes
 NODES = 96  # along the radius, for means: the steps of the tube leave kinks
 STEPS = 6  # in which the tube narrows: the inflow to 1e-3 of its mean
 FIRST = rotor_modes(0, 1)
-MOMENTUM, LENGTH, CLEARANCE = 1 / sqrt(2), 0.2, 0.9  # the defaults, see `contraction`
+MOMENTUM, LENGTH, CLEARANCE = 1 / sqrt(2), 0.25, 0.9  # the defaults, see `contraction`
 Functions = Callable[[ModeTable, Float[Array, "*N 3"]], Float[Array, "..."]]
 
 
@@ -75,8 +75,8 @@ def contraction(radius: float = MOMENTUM, length: float = LENGTH, clearance: flo
     """Make a contraction; see `Contraction`.
 
     The far radius is momentum theory's (Landgrebe's tip vortex: 0.78), the length and the clearance are rounded from
-    the free wake's inflow out of ground effect and at h = 1. Raises InputError where the radius is not in (0, 1] or
-    another number is not positive.
+    the free wake's inflow out of ground effect and at h = 1 (benchmarks/contraction.py). Raises InputError where the
+    radius is not in (0, 1] or another number is not positive.
     """
     if not 0 < radius <= 1:
         raise InputError(f"Argument `radius` must lie in (0, 1] (of the wake far below, over R), but is {radius}")

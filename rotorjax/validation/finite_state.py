@@ -181,17 +181,16 @@ def draw(
 
 
 KNOWN = (
-    "At h = 0.75 the free wake has a fountain at the hub: the stagnation pressure that the outboard jet leaves on "
-    "the ground blows the inboard air back, which has little total head. A flow without vorticity has one head: "
-    "within 0.5 R the difference is 0.35, outside 0.15. Valley less mountain side: where the load leans to the "
-    "mountain, as it does in the free wake, so does the finite states' inflow, against what the ground does; over "
-    "10° their rest is half the free wake's, over 15° 0.62. Eight free turns change the free wake's by −9, −2 and 9 "
-    "% over 10°, 20° and 30°, but with the load of eight the finite states' rest over 10° is nothing, over 20° 0.51 "
-    "of it, over 30° 0.86. That the row of 10° was met with 0.68 before repeated turns kept their speed along the "
-    "plane was luck: eight turns gave 0.06 then. Mean inflow under the load out of ground effect is below the lower "
-    "of the two curves by 0.002, 0.014 and 0.010; the curves are read off torque. Own blade loads: at h = 1.5 power "
-    "is 0.006 below the lower curve; out of ground effect it is 1.2 % below the ideal, for inflow is small or upward "
-    "at the tip, and lift ends at once at 0.97 R and does not fade towards it. Without that tip loss the factor is "
-    "0.82, and at h = 1 power is 0.76 of that out of ground effect."
+    "At h = 0.75 the free wake has a fountain at the hub: the stagnation pressure that the outboard jet leaves on the "
+    "ground blows the inboard air back, which has little total head. A flow without vorticity has one head: within "
+    "0.5 R the difference is 0.32, outside 0.12. Valley less mountain side: where the load leans to the mountain, as "
+    "it does in the free wake, so does the finite states' inflow, against what the ground does; over 10° their rest "
+    "is half the free wake's, over 15° 0.63. Eight free turns change the free wake's by −9, −2 and 9 % over 10°, 20° "
+    "and 30°, but with the load of eight the finite states' rest over 10° is nothing, over 20° 0.51 of it, over 30° "
+    "0.86. That the row of 10° was met with 0.68 before repeated turns kept their speed along the plane was luck: "
+    "eight turns gave 0.06 then. Mean inflow under the load out of ground effect is below the lower of the two curves "
+    "by 0.002, 0.013 and 0.010; the curves are read off torque. Own blade loads: at h = 1.5 power is 0.006 below the "
+    "lower curve. Lift ends at 0.97 R at once and does not fade towards it; without that end, inflow being small or "
+    "upward at the tip, the induced power factor would be 0.86, and power at h = 1 0.76 of that out of ground effect."
 )
 CASE = ValidationCase(NAME, "The finite-state model", points, compare, KNOWN)
