@@ -3,12 +3,12 @@
 For each length of the contraction: rms difference from the free wake's inflow under the free wake's loads, over its
 mean out of ground effect, in free air and over level ground; and of the finite states with their own blade loads
 induced power in free air over the ideal, which may not be less than 1, and at constant thrust over ground over that in
-free air. The UH-60 at 18° chose the length, and only by the differences; the other rotors, its other pitch and all
-power are judged.
+free air. The UH-60 at 18° chose the length, by the differences and with its power in view; its other pitch and the
+other rotors are judged.
 """
 
 import argparse
-from dataclasses import replace
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -19,17 +19,15 @@ from rotorjax.bench.cases import Case
 from rotorjax.bench.finite_state import model_of
 from rotorjax.bench.record import rms_difference
 from rotorjax.bench.settings import StudySettings, study_settings
-from rotorjax.inflow.balance import Balance, Stations, balance, pressure, stations_of
+from rotorjax.inflow.balance import Stations, pressure
 from rotorjax.potential.contraction import CLEARANCE, contraction
 from rotorjax.potential.model import FiniteStateModel, steady_state, unit_inflow, unit_states
-from rotorjax.reference.published import induced_power_factor
-from rotorjax.validation.ground import STEP_DEG, power_ratio
+from rotorjax.validation.finite_state import MEASURED, own_powers
 from rotorjax.validation.point import Point
 from rotorjax.wake.solution import Solution, solve
 
 LENGTHS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35)
 HEIGHTS = (None, 2.0, 1.5, 1.0, 0.75)
-POWERS = (0.5, 0.75, 1.0, 1.5)  # heights of the power ratios
 CASES = (("uh60", 18.0), ("uh60", 14.0), ("caradonna_tung", 8.0), ("knight_hefner_2", 8.0), ("knight_hefner_4", 8.0))
 
 
@@ -52,19 +50,6 @@ def difference(model: FiniteStateModel, wake: Solution, mean: float) -> float:
     return rms_difference(np.asarray(_inflow(model, loads, stations)) / mean, wake.inflow / mean, wake.widths)
 
 
-def powers(length: float, clearance: float, settings: StudySettings) -> tuple[float, list[float]]:
-    """Induced power factor in free air, and the ratios at POWERS; own blade loads."""
-    rotor, step = settings.rotor, np.deg2rad(STEP_DEG)
-
-    def found(height: float | None, more: float = 0.0) -> Balance:
-        operating = replace(settings.operating, collective=settings.operating.collective + more)
-        return balance(contracting(length, clearance, height, settings), rotor, operating, stations_of(rotor))
-
-    alone = found(None), found(None, step)
-    factor = induced_power_factor(float(alone[0].CT), float(alone[0].CP_induced))
-    return factor, [power_ratio(found(height), alone) for height in POWERS]
-
-
 def wakes_of(rotor: str, pitch: float) -> list[Solution]:
     """Free wakes at HEIGHTS."""
     found: list[Solution] = []
@@ -80,7 +65,7 @@ def main() -> None:
     parser.add_argument("--clearance", type=float, default=CLEARANCE, help="height at which it contracts half as much")
     clearance = parser.parse_args().clearance
     jax.config.update("jax_enable_x64", True)
-    print(f"clearance {clearance:g} R; differences OGE, h =", *HEIGHTS[1:], "; power OGE; ratios at h =", *POWERS)
+    print(f"clearance {clearance:g} R; differences OGE, h =", *HEIGHTS[1:], "; power OGE; ratios at h =", *MEASURED)
     for rotor, pitch in CASES:
         settings, wakes = study_settings(rotor, pitch), wakes_of(rotor, pitch)
         for length in LENGTHS:
@@ -88,7 +73,7 @@ def main() -> None:
                 difference(contracting(length, clearance, height, settings), wake, wakes[0].mean_inflow)
                 for height, wake in zip(HEIGHTS, wakes, strict=True)
             ]
-            factor, ratios = powers(length, clearance, settings)
+            ratios, factor = own_powers(settings, partial(contracting, length, clearance))
             print(
                 f"{rotor:16} {pitch:3.0f}° L {length:4.2f} R:", *(f"{a:.3f}" for a in apart),
                 f"; {factor:.3f};", *(f"{a:.3f}" for a in ratios), flush=True,

@@ -17,7 +17,6 @@ import rotorjax as rj
 from rotorjax.reference.published import figure_of_merit, knight_hefner
 from rotorjax.rotor.airfoil import AirfoilTable, airfoil_table, lift_drag
 from rotorjax.rotor.full_range import FLAT_PLATE, completed
-from rotorjax.rotor.geometry import Rotor
 from rotorjax.wake.model import free_wake
 from rotorjax.wake.settings import hover_settings
 from rotorjax.wake.solution import solve
@@ -31,8 +30,11 @@ MACH = np.array([0.05, 0.1, 0.15, 0.2, 0.225, 0.25])
 
 def section(exponent: float) -> AirfoilTable:
     """NACA 0015 with transition where disturbances have grown by e^exponent; a flat plate beyond 17.5°."""
-    import aerosandbox
-    import neuralfoil
+    try:
+        import aerosandbox
+        import neuralfoil
+    except ImportError as error:
+        raise SystemExit(f"section_transition.py needs {error.name}: pip install neuralfoil") from error
 
     shape, alpha = aerosandbox.Airfoil("naca0015"), np.arange(0.0, 18.0, 0.5)
     found = [
@@ -54,7 +56,7 @@ def rows(blades: int, air: AirfoilTable | None, pitches: tuple[float, ...]) -> l
     told, found, polar = [], None, knight_hefner(blades)
     for pitch in pitches:
         rotor, operating = rj.rotor(ROTORS[blades], pitch)
-        rotor = rotor if air is None else with_section(rotor, air)
+        rotor = rotor if air is None else eqx.tree_at(lambda r: r.airfoil, rotor, air)
         found = solve(free_wake(rotor, operating, None, hover_settings()), found)
         if not found.converged:
             raise RuntimeError(f"{ROTORS[blades]}, {pitch}°: {found.why}")
@@ -63,11 +65,6 @@ def rows(blades: int, air: AirfoilTable | None, pitches: tuple[float, ...]) -> l
         merit = figure_of_merit(found.CT, found.CP) - figure_of_merit(found.CT, measured)
         told.append(f"{pitch:5.0f}° {100 * thrust:+6.1f} % {100 * (found.CP / measured - 1):+6.1f} % {merit:+7.3f}")
     return sorted(told)
-
-
-def with_section(rotor: Rotor, air: AirfoilTable) -> Rotor:
-    """The rotor with another section."""
-    return eqx.tree_at(lambda r: r.airfoil, rotor, air)
 
 
 def main() -> None:

@@ -15,7 +15,9 @@ from rotorjax.wake.solution import Solution
 NAME, SOURCE = "polars", "Knight & Hefner, NACA TN 626, 1937"
 ROTORS = {2: "knight_hefner_2", 4: "knight_hefner_4"}
 PITCHES = (8.0, 6.0, 4.0, 10.0)
-UNCERTAINTY = "pitch ±0.05°, thrust ±1 %, torque ±1 %; C_T at a pitch by what transition does to the section, ±8 %"
+UNCERTAINTY = (
+    "pitch ±0.05°, thrust ±1 %, torque ±1 %; C_T at a pitch by what transition may do to the section, ±8 % by XFOIL"
+)
 AIM = "the aim set for this wake; no setting is tuned for a rotor"
 MEASURED = Against(SOURCE, UNCERTAINTY, AIM)
 TORQUE_ERROR = 0.01
@@ -101,14 +103,15 @@ KNOWN = (
     "Thrust at a given pitch is 7 to 15 % low: the rotors lift what ours do with 0.2 to 1.0° less pitch. At the same "
     "thrust two blades need the measured torque to 2.6 % and have its figure of merit to 0.011, so inflow and drag "
     "are right there and the pitch that they go with is not. What is missing is one number for both rotors, 0.50° of "
-    "pitch for each 0.001 of C_T a blade, within 0.10° rms, as of a section with a slope of 6.8 a radian where 5.75 "
-    "was measured, and that is what still air does to it: at the blades' Reynolds numbers its lift hangs on a laminar "
-    "bubble. By XFOIL's e^N (benchmarks/section_transition.py) the reported lift is that of N = 4 or less (air with "
-    "0.6 % of turbulence), and our C_T goes from −8 −9 −9 −6 % of two blades and −3 −4 −5 −8 % of four with N = 4 "
-    "over −7 −6 −5 0 and −3 −3 −2 −3 % with N = 6 to −3 2 6 8 and −2 2 7 6 % with N = 9, still air: the state of the "
-    "boundary layer, which is not known, is worth three times the band of 5 %, and the measurement lies inside. "
-    "Blade elements with the reported lift slope, uniform inflow and no tip loss give C_T = 0.0032 and 0.0052 at 8°: "
-    "the measurement has 1.01 and 0.95 of it, ours 0.87 and 0.86, and of Caradonna and Tung's rotor, whose short "
+    "pitch for each 0.001 of C_T a blade, within 0.10° rms, as of blades that twist nose up by their lift, which is "
+    "not known of them, or of a section with a slope of 6.8 a radian where 5.75 was measured, which still air may "
+    "well make of it: at the blades' Reynolds numbers its lift hangs on a laminar bubble. By NeuralFoil's fit to "
+    "XFOIL's e^N (benchmarks/section_transition.py) the reported lift is that of N = 4 or less (air with 0.6 % of "
+    "turbulence), and our C_T goes from −8 −9 −9 −6 % of two blades and −3 −4 −5 −8 % of four with N = 4 over −7 −6 "
+    "−5 0 and −3 −3 −2 −3 % with N = 6 to −3 2 6 8 and −2 2 7 6 % with N = 9, still air: the state of the boundary "
+    "layer, which is not known, is worth 5 to 20 %, and the measurement lies inside from 6° up, 2 and 3 % beyond at "
+    "4°. Blade elements with the reported lift slope, uniform inflow and no tip loss give C_T = 0.0032 and 0.0052 at "
+    "8°: the measurement has 1.01 and 0.95 of it, ours 0.87 and 0.86, and of Caradonna and Tung's rotor, whose short "
     "blades chose the settings, 0.71 was measured. Four blades need 8 to 18 % more torque than ours, 3.0e-5 to "
     "4.5e-5; 1.4e-5 of it is there at zero pitch without lift, where the four blades' torque is 1.34e-4 and the "
     "section's drag gives 1.20e-4. The two blades' is 5.4e-5, which is 20 % less a blade. No section makes up for it: "
