@@ -1,4 +1,4 @@
-"""In which depth does the finite states' wake contract? `python benchmarks/contraction.py [--clearance C]`.
+"""In which depth does the finite states' wake contract? `python benchmarks/contraction.py [--quick] [--clearance C]`.
 
 For each length of the contraction: rms difference from the free wake's inflow under the free wake's loads, over its
 mean out of ground effect, in free air and over level ground; and of the finite states with their own blade loads
@@ -50,11 +50,11 @@ def difference(model: FiniteStateModel, wake: Solution, mean: float) -> float:
     return rms_difference(np.asarray(_inflow(model, loads, stations)) / mean, wake.inflow / mean, wake.widths)
 
 
-def wakes_of(rotor: str, pitch: float) -> list[Solution]:
+def wakes_of(rotor: str, pitch: float, quick: bool) -> list[Solution]:
     """Free wakes at HEIGHTS."""
     found: list[Solution] = []
     for height in HEIGHTS:
-        found.append(solve(Point(rotor, pitch, height).model(False), found[-1] if found else None))
+        found.append(solve(Point(rotor, pitch, height).model(quick), found[-1] if found else None))
         if not found[-1].converged:
             raise RuntimeError(f"{rotor} at {pitch:g}°, h = {height}: {found[-1].why}")
     return found
@@ -63,11 +63,15 @@ def wakes_of(rotor: str, pitch: float) -> list[Solution]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--clearance", type=float, default=CLEARANCE, help="height at which it contracts half as much")
-    clearance = parser.parse_args().clearance
+    parser.add_argument(
+        "--quick", action="store_true", help="the coarse wake of `rotorjax study --quick`; UH-60 at 18°"
+    )
+    options = parser.parse_args()
+    clearance, quick = options.clearance, options.quick
     jax.config.update("jax_enable_x64", True)
     print(f"clearance {clearance:g} R; differences OGE, h =", *HEIGHTS[1:], "; power OGE; ratios at h =", *MEASURED)
-    for rotor, pitch in CASES:
-        settings, wakes = study_settings(rotor, pitch), wakes_of(rotor, pitch)
+    for rotor, pitch in CASES[:1] if quick else CASES:
+        settings, wakes = study_settings(rotor, pitch, quick=quick), wakes_of(rotor, pitch, quick)
         for length in LENGTHS:
             apart = [
                 difference(contracting(length, clearance, height, settings), wake, wakes[0].mean_inflow)
